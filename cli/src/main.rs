@@ -1,0 +1,2 @@
+//! The `umbilic` command.
+fn main() {}

@@ -1,0 +1,9 @@
+//! Geometry of points, surfaces and meshes that every other crate stands on.
+//!
+//! Vectors are [`glam::DVec3`]; curvatures follow the normal `S_u × S_v`, so that a sphere with
+//! its outward normal has negative mean curvature.
+
+mod poly_mesh;
+
+pub use glam::{DMat3, DVec2, DVec3};
+pub use poly_mesh::{FaceId, HalfEdgeId, MeshError, PolyMesh, VertexId};
