@@ -1,2 +1,46 @@
-//! Chores.
-fn main() {}
+//! Chores of the workspace: `cargo xtask <chore>`.
+#![allow(clippy::print_stdout, reason = "chores talk to the person who runs them")]
+
+mod bench;
+mod ci;
+mod regress;
+mod scene;
+mod shell;
+mod tidy;
+
+use std::process::ExitCode;
+
+const HELP: &str = "\
+cargo xtask <chore>
+
+  ci                       what CI runs: fmt, clippy, tests, doc tests, docs, tidy, regress
+  tidy                     dependency directions, cited papers, stray paths, file sizes
+  regress [NAME…]          run the scenes under fixtures/regress (all, or those named)
+  regress --bless NAME     rewrite the CloseTo values of one scene (never a bound)
+  bench [PACKAGE…]         run the benches and record them in docs/benchmarks.md
+  bench --proof            run the solver on the public test sets, write docs/solver-proof.md
+";
+
+fn main() -> ExitCode {
+    let arguments: Vec<String> = std::env::args().skip(1).collect();
+    let arguments: Vec<&str> = arguments.iter().map(String::as_str).collect();
+    let outcome = match arguments.as_slice() {
+        ["ci"] => ci::run(),
+        ["tidy"] => tidy::run(),
+        ["regress", "--bless", name] => regress::bless(name),
+        ["regress", names @ ..] => regress::run(names).map(|_| ()),
+        ["bench", "--proof"] => bench::proof(),
+        ["bench", packages @ ..] => bench::run(packages),
+        _ => {
+            println!("{HELP}");
+            return if arguments.is_empty() { ExitCode::SUCCESS } else { ExitCode::from(2) };
+        }
+    };
+    match outcome {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(message) => {
+            eprintln!("xtask: {message}");
+            ExitCode::FAILURE
+        }
+    }
+}

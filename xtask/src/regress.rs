@@ -1,0 +1,122 @@
+//! `cargo xtask regress`: run the scenes and compare their metrics with what is expected.
+
+use crate::scene::{Expectation, NamedScene, all, look_up};
+use crate::shell::{Outcome, cargo, check, read, root, write};
+use serde_json::Value;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+use std::time::Instant;
+
+/// Runs the scenes named (all if none is) and returns those skipped, each with the reason.
+pub(crate) fn run(names: &[&str]) -> Outcome<Vec<String>> {
+    let scenes = all()?;
+    if let Some(unknown) = names.iter().find(|n| !scenes.iter().any(|s| s.name == **n)) {
+        return Err(format!("there is no scene {unknown} under fixtures/regress"));
+    }
+    build()?;
+    let (mut skipped, mut missed) = (Vec::new(), 0);
+    for scene in scenes.iter().filter(|s| names.is_empty() || names.contains(&s.name.as_str())) {
+        if let Some(reason) = missing_folder(scene) {
+            skipped.push(format!("regress {}: {reason}", scene.name));
+            continue;
+        }
+        let start = Instant::now();
+        let metrics = measure(scene)?;
+        println!("{} ({:.2} s)", scene.name, start.elapsed().as_secs_f64());
+        for (key, wanted) in &scene.scene.expect {
+            let got = look_up(&metrics, key);
+            let holds = wanted.holds(got);
+            missed += usize::from(!holds);
+            let got = got.map_or_else(|| "nothing".to_owned(), Value::to_string);
+            println!("  {} {key}: wanted {wanted}, got {got}", if holds { "ok  " } else { "MISS" });
+        }
+    }
+    if missed > 0 { Err(format!("{missed} values are not as expected")) } else { Ok(skipped) }
+}
+
+/// Rewrites the `CloseTo` values of one scene to what it measures now, keeping their tolerances.
+pub(crate) fn bless(name: &str) -> Outcome {
+    let scenes = all()?;
+    let scene =
+        scenes.iter().find(|s| s.name == name).ok_or(format!("there is no scene {name}"))?;
+    build()?;
+    let metrics = measure(scene)?;
+    let mut text = read(&scene.path)?;
+    for (key, wanted) in &scene.scene.expect {
+        let Expectation::CloseTo(_, tolerance) = wanted else { continue };
+        let got = look_up(&metrics, key).and_then(Value::as_f64);
+        let got = got.ok_or(format!("{name}: the metrics have no number {key}"))?;
+        text = replace_close_to(&text, key, got, *tolerance)
+            .ok_or(format!("{name}: no CloseTo for {key} on a line of its own"))?;
+    }
+    write(&scene.path, &text)
+}
+
+/// The text with the `CloseTo(…)` behind `"key":` replaced.
+fn replace_close_to(text: &str, key: &str, value: f64, tolerance: f64) -> Option<String> {
+    let at = text.find(&format!("\"{key}\""))?;
+    let open = at + text[at..].find("CloseTo(")?;
+    let close = open + text[open..].find(')')? + 1;
+    Some(format!("{}CloseTo({value:?}, {tolerance:?}){}", &text[..open], &text[close..]))
+}
+
+fn build() -> Outcome {
+    check(cargo(&["build", "--quiet", "--package", "cli"]))
+}
+
+fn folder_of(need: &str) -> Option<PathBuf> {
+    let variable = format!("UMBILIC_{}", need.to_uppercase());
+    std::env::var_os(variable).map(PathBuf::from).filter(|path| path.is_dir())
+}
+
+fn missing_folder(scene: &NamedScene) -> Option<String> {
+    let need = scene.scene.needs.as_deref()?;
+    let missing = folder_of(need).is_none();
+    missing.then(|| format!("UMBILIC_{} names no folder", need.to_uppercase()))
+}
+
+/// Runs one scene in a scratch folder under `target` and reads the metrics it wrote.
+fn measure(scene: &NamedScene) -> Outcome<Value> {
+    let out = root().join("target/regress").join(&scene.name);
+    let _ = std::fs::remove_dir_all(&out);
+    std::fs::create_dir_all(&out).map_err(|e| format!("{}: {e}", out.display()))?;
+    let metrics = out.join("metrics.json");
+    let mut command = Command::new(program());
+    command.current_dir(root());
+    command.args(scene.scene.args.iter().map(|argument| fill_in(argument, &out)));
+    command.arg("-q").arg("--metrics").arg(&metrics);
+    let output = command.output().map_err(|e| format!("{}: {e}", scene.name))?;
+    if !output.status.success() {
+        let said = String::from_utf8_lossy(&output.stderr);
+        return Err(format!("{}: umbilic ended with {}: {said}", scene.name, output.status));
+    }
+    serde_json::from_str(&read(&metrics)?).map_err(|e| format!("{}: {e}", metrics.display()))
+}
+
+fn program() -> PathBuf {
+    let target =
+        std::env::var_os("CARGO_TARGET_DIR").map_or_else(|| root().join("target"), PathBuf::from);
+    target.join("debug").join(format!("umbilic{}", std::env::consts::EXE_SUFFIX))
+}
+
+fn fill_in(argument: &str, out: &Path) -> String {
+    let mut filled = argument.replace("{out}", &out.to_string_lossy());
+    for need in ["models", "reference"] {
+        if let Some(folder) = folder_of(need) {
+            filled = filled.replace(&format!("{{{need}}}"), &folder.to_string_lossy());
+        }
+    }
+    filled
+}
+
+#[cfg(test)]
+mod tests {
+    use super::replace_close_to;
+
+    #[test]
+    fn blessing_changes_the_value_and_keeps_the_tolerance() {
+        let text = "expect: {\"a\": AtMost(1.0), \"b\": CloseTo(2.0, 0.1)}";
+        let blessed = replace_close_to(text, "b", 3.5, 0.1).unwrap();
+        assert_eq!(blessed, "expect: {\"a\": AtMost(1.0), \"b\": CloseTo(3.5, 0.1)}");
+    }
+}
