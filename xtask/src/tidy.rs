@@ -108,7 +108,7 @@ fn sources(shown: &str, text: &str, references: &str, faults: &mut Vec<String>) 
     }
 }
 
-/// Citations of the forms `Author et al. 2021` and `Author and Other 2021`: first author and year.
+/// Citations of the forms `Pellis et al. 2021`: first author and year.
 fn citations(text: &str) -> BTreeSet<(String, String)> {
     let mut found = BTreeSet::new();
     for (at, _) in text.match_indices(" et al. ") {
