@@ -4,6 +4,8 @@
 //! its outward normal has negative mean curvature.
 
 mod poly_mesh;
+mod tri_mesh;
 
 pub use glam::{DMat3, DVec2, DVec3};
 pub use poly_mesh::{FaceId, HalfEdgeId, MeshError, PolyMesh, VertexId};
+pub use tri_mesh::{ClosestPoint, Foot, Nearest, TriMesh, closest_barycentric, closest_on_segment};
