@@ -1,1 +1,18 @@
-//! Being built.
+//! Tensor-product B-splines: knot vectors, curves and surfaces of any bi-degree up to 15, clamped,
+//! open and periodic, polynomial and rational, with exact derivatives up to order four.
+//!
+//! Control points of a surface stand in the order `i * n_v + j`; parameters outside the domain
+//! are clamped to it, or wrapped where the direction is periodic.
+
+mod basis;
+mod curve;
+mod error;
+mod knots;
+mod rational;
+mod surface;
+
+pub use basis::{BasisValues, MAX_DERIVATIVE};
+pub use curve::BsplineCurve;
+pub use error::SplineError;
+pub use knots::{Degree, KnotError, KnotVector};
+pub use surface::BsplineSurface;

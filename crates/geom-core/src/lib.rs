@@ -3,9 +3,21 @@
 //! Vectors are [`glam::DVec3`]; curvatures follow the normal `S_u × S_v`, so that a sphere with
 //! its outward normal has negative mean curvature.
 
+mod bounding_box;
+mod close;
+mod forms;
+mod jet;
 mod poly_mesh;
 mod tri_mesh;
 
+pub use bounding_box::BoundingBox;
+pub use close::assert_close;
+pub use forms::{
+    CurvatureError, FirstForm, PrincipalCurvatures, SINGULAR_RATIO, SecondForm,
+    asymptotic_directions, gaussian_curvature, gradient_norm_squared, mean_curvature,
+    normal_curvature, principal_curvatures,
+};
 pub use glam::{DMat3, DVec2, DVec3};
+pub use jet::SurfaceJet;
 pub use poly_mesh::{FaceId, HalfEdgeId, MeshError, PolyMesh, VertexId};
 pub use tri_mesh::{ClosestPoint, Foot, Nearest, TriMesh, closest_barycentric, closest_on_segment};
