@@ -1,0 +1,42 @@
+//! The commands, one file each.
+//!
+//! To add one: write `commands/<name>.rs` with a struct that derives `Debug` and `clap::Args` and
+//! has `fn run(self, context: &Context) -> Result<Outcome, Failure>`, then add a line to each of
+//! the two lists below. `run` first checks its output paths, then reads, computes, and returns all
+//! files as bytes: `main` writes them together with the metrics and prints the summary.
+
+mod convert;
+
+use crate::context::Context;
+use crate::failure::Failure;
+use crate::outcome::Outcome;
+
+macro_rules! commands {
+    ($($(#[$help:meta])* $module:ident :: $command:ident),* $(,)?) => {
+        /// What to do.
+        #[derive(Debug, clap::Subcommand)]
+        pub(crate) enum Command {
+            $($(#[$help])* $command($module::$command)),*
+        }
+
+        impl Command {
+            /// The name in the metrics file.
+            pub(crate) fn name(&self) -> &'static str {
+                match self {
+                    $(Self::$command(_) => stringify!($module)),*
+                }
+            }
+
+            pub(crate) fn run(self, context: &Context) -> Result<Outcome, Failure> {
+                match self {
+                    $(Self::$command(command) => command.run(context)),*
+                }
+            }
+        }
+    };
+}
+
+commands! {
+    /// Change the format of surfaces, meshes, curves and points
+    convert::Convert,
+}

@@ -1,0 +1,93 @@
+//! What every command is given: verbosity, threads, the interrupt flag, a progress bar.
+
+use crate::args::GlobalArgs;
+use crate::failure::{Failure, INTERRUPTED};
+use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
+use std::io::IsTerminal;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+/// Set up once, before the command runs.
+#[derive(Debug)]
+pub(crate) struct Context {
+    /// Threads of the global rayon pool.
+    pub(crate) threads: usize,
+    quiet: bool,
+    interrupt: Arc<AtomicBool>,
+}
+
+impl Context {
+    /// Starts the thread pool, logging, and the Ctrl-C handler.
+    pub(crate) fn new(global: &GlobalArgs) -> Result<Self, Failure> {
+        start_logging(global.verbose);
+        let mut pool = rayon::ThreadPoolBuilder::new();
+        if let Some(threads) = global.threads {
+            pool = pool.num_threads(threads.get());
+        }
+        pool.build_global().map_err(|e| Failure::other(format!("cannot start threads: {e}")))?;
+        let interrupt = Arc::new(AtomicBool::new(false));
+        let flag = Arc::clone(&interrupt);
+        // The first Ctrl-C asks the solver to stop and write its checkpoint, the second one ends.
+        let handler = move || {
+            if flag.swap(true, Ordering::SeqCst) {
+                std::process::exit(i32::from(INTERRUPTED));
+            }
+        };
+        ctrlc::set_handler(handler)
+            .map_err(|e| Failure::other(format!("cannot listen for Ctrl-C: {e}")))?;
+        Ok(Self { threads: rayon::current_num_threads(), quiet: global.quiet, interrupt })
+    }
+
+    /// Whether the user pressed Ctrl-C: the callback of every solver asks.
+    #[allow(dead_code, reason = "used by the solving commands")]
+    pub(crate) fn interrupted(&self) -> bool {
+        self.interrupt.load(Ordering::SeqCst)
+    }
+
+    /// A progress bar of `steps` steps on stderr; invisible unless stderr is a terminal.
+    #[allow(dead_code, reason = "used by the solving commands")]
+    pub(crate) fn progress(&self, label: &'static str, steps: usize) -> Progress {
+        let visible = !self.quiet && std::io::stderr().is_terminal();
+        let target =
+            if visible { ProgressDrawTarget::stderr() } else { ProgressDrawTarget::hidden() };
+        let bar = ProgressBar::with_draw_target(Some(steps as u64), target);
+        let style = ProgressStyle::with_template("{prefix} {wide_bar} {pos}/{len} {msg}");
+        bar.set_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()));
+        bar.set_prefix(label);
+        Progress(bar)
+    }
+}
+
+/// A progress bar that vanishes when dropped.
+#[derive(Debug)]
+pub(crate) struct Progress(ProgressBar);
+
+#[allow(dead_code, reason = "used by the solving commands")]
+impl Progress {
+    /// `done` steps are done; `message` tells the current energies.
+    pub(crate) fn at(&self, done: usize, message: impl Into<String>) {
+        self.0.set_position(done as u64);
+        self.0.set_message(message.into());
+    }
+}
+
+impl Drop for Progress {
+    fn drop(&mut self) {
+        self.0.finish_and_clear();
+    }
+}
+
+fn start_logging(verbose: u8) {
+    let level = match verbose {
+        0 => return,
+        1 => tracing::Level::INFO,
+        2 => tracing::Level::DEBUG,
+        _ => tracing::Level::TRACE,
+    };
+    // An error here means that logging is already on, which only happens in tests.
+    let _ = tracing_subscriber::fmt()
+        .with_max_level(level)
+        .with_writer(std::io::stderr)
+        .with_ansi(std::io::stderr().is_terminal())
+        .try_init();
+}

@@ -1,0 +1,116 @@
+//! What a command hands back: files still in memory, numbers, and a summary.
+
+use crate::failure::Failure;
+use serde::Serialize;
+use std::path::{Path, PathBuf};
+
+/// How a command ended. Commands that do not iterate always converge.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+#[allow(dead_code, reason = "used by the solving commands")]
+pub(crate) enum Status {
+    Converged,
+    Stalled,
+    IterationLimit,
+    Interrupted,
+    Infeasible,
+}
+
+/// The result of a command. Nothing is on disk yet: all files are written together at the end,
+/// or none of them.
+#[derive(Debug)]
+pub(crate) struct Outcome {
+    pub(crate) status: Status,
+    pub(crate) iterations: usize,
+    /// The main input as the user named it.
+    pub(crate) input: Option<PathBuf>,
+    /// Result files with their bytes, `-o` outputs first.
+    pub(crate) files: Vec<(PathBuf, Vec<u8>)>,
+    /// The checkpoint, the only file besides the metrics that an interrupted run writes.
+    pub(crate) checkpoint: Option<(PathBuf, Vec<u8>)>,
+    /// The `metrics` object, keys as documented.
+    pub(crate) metrics: serde_json::Value,
+    /// Lines for people, with units.
+    pub(crate) summary: Vec<String>,
+    /// What the user should know although there is a result.
+    pub(crate) warnings: Vec<String>,
+    /// Whether another status than `converged` exits with code 3.
+    pub(crate) require_converged: bool,
+}
+
+impl Outcome {
+    /// An outcome without files, numbers or words.
+    pub(crate) fn new(status: Status, iterations: usize) -> Self {
+        Self {
+            status,
+            iterations,
+            input: None,
+            files: Vec::new(),
+            checkpoint: None,
+            metrics: serde_json::json!({}),
+            summary: Vec::new(),
+            warnings: Vec::new(),
+            require_converged: false,
+        }
+    }
+
+    /// Names the input.
+    pub(crate) fn with_input(mut self, path: &Path) -> Self {
+        self.input = Some(path.to_path_buf());
+        self
+    }
+
+    #[allow(dead_code, reason = "used by the commands that measure")]
+    /// Sets the `metrics` object from a struct with documented field names.
+    pub(crate) fn with_metrics<T: Serialize>(mut self, metrics: &T) -> Result<Self, Failure> {
+        self.metrics = serde_json::to_value(metrics).map_err(Failure::other)?;
+        Ok(self)
+    }
+
+    /// The bytes of the metrics file.
+    pub(crate) fn metrics_file(&self, command: &str, seconds: f64, threads: usize) -> Vec<u8> {
+        let file = MetricsFile {
+            schema: 1,
+            command,
+            status: self.status,
+            iterations: self.iterations,
+            seconds,
+            threads,
+            input: self.input.as_deref().map(|p| p.display().to_string()),
+            outputs: self.written().map(|(path, _)| path.display().to_string()).collect(),
+            metrics: &self.metrics,
+        };
+        // Plain structs, strings and numbers: this cannot fail.
+        let mut bytes = serde_json::to_vec_pretty(&file).unwrap_or_default();
+        bytes.push(b'\n');
+        bytes
+    }
+
+    /// Writes all files, or none of them.
+    pub(crate) fn write_files(&self, metrics: Option<(PathBuf, Vec<u8>)>) -> Result<(), Failure> {
+        let files: Vec<(&Path, &[u8])> = self
+            .written()
+            .chain(metrics.as_ref())
+            .map(|(path, bytes)| (path.as_path(), bytes.as_slice()))
+            .collect();
+        exchange::write_files(&files).map_err(Failure::usage)
+    }
+
+    fn written(&self) -> impl Iterator<Item = &(PathBuf, Vec<u8>)> {
+        let results = if self.status == Status::Interrupted { &[][..] } else { &self.files };
+        results.iter().chain(&self.checkpoint)
+    }
+}
+
+#[derive(Serialize)]
+struct MetricsFile<'a> {
+    schema: u32,
+    command: &'a str,
+    status: Status,
+    iterations: usize,
+    seconds: f64,
+    threads: usize,
+    input: Option<String>,
+    outputs: Vec<String>,
+    metrics: &'a serde_json::Value,
+}

@@ -1,0 +1,185 @@
+//! Reading whole files, and writing them so that a reader never sees half of one.
+
+use crate::error::{ReadError, WriteError};
+use std::ffi::OsString;
+use std::fs::{self, File, OpenOptions};
+use std::io::Write;
+use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicU64, Ordering};
+
+/// The bytes of a regular file.
+///
+/// # Errors
+/// [`ReadError::NotAFile`] for folders and devices (some of which never end), else
+/// [`ReadError::Io`].
+pub fn read_bytes(path: &Path) -> Result<Vec<u8>, ReadError> {
+    if !fs::metadata(path)?.is_file() {
+        return Err(ReadError::NotAFile);
+    }
+    Ok(fs::read(path)?)
+}
+
+/// The text of a regular file.
+///
+/// # Errors
+/// As [`read_bytes`], and [`ReadError::Binary`] at the first byte that is not UTF-8.
+pub fn read_text(path: &Path) -> Result<String, ReadError> {
+    into_text(read_bytes(path)?)
+}
+
+/// Bytes as UTF-8 text, without a byte order mark.
+pub(crate) fn into_text(bytes: Vec<u8>) -> Result<String, ReadError> {
+    let text = String::from_utf8(bytes).map_err(|error| {
+        let offset = error.utf8_error().valid_up_to();
+        ReadError::binary(offset, "the text is not UTF-8", "save the file as UTF-8")
+    })?;
+    Ok(match text.strip_prefix('\u{feff}') {
+        Some(rest) => rest.to_owned(),
+        None => text,
+    })
+}
+
+/// Whether [`write_files`] could write at `path`: its folder exists and takes new files, and what
+/// may be there already is a regular file. Leaves nothing behind.
+///
+/// # Errors
+/// [`WriteError`] says what is in the way.
+pub fn check_writable(path: &Path) -> Result<(), WriteError> {
+    Prepared::create(path).map(drop)
+}
+
+/// Writes all files, or none of them: every one is first written to a temporary file in its own
+/// folder and flushed to the disk, then all are renamed into place. Existing files are replaced as
+/// a whole, so that at any moment a reader finds the old or the new content.
+///
+/// # Errors
+/// [`WriteError::InFile`] names the file at fault. No target was touched, unless a rename itself
+/// fails after an earlier one succeeded (another process removed the folder in between).
+pub fn write_files(files: &[(&Path, &[u8])]) -> Result<(), WriteError> {
+    let named = |path: &Path| {
+        let file = path.display().to_string();
+        move |error: WriteError| WriteError::InFile { file, error: Box::new(error) }
+    };
+    let mut prepared = Vec::with_capacity(files.len());
+    for (path, bytes) in files {
+        let mut file = Prepared::create(path).map_err(named(path))?;
+        file.fill(bytes).map_err(named(path))?;
+        prepared.push((path, file));
+    }
+    for (path, file) in prepared {
+        file.rename().map_err(named(path))?;
+    }
+    Ok(())
+}
+
+/// A temporary file beside its target; removed when dropped before [`Prepared::rename`].
+struct Prepared {
+    temporary: PathBuf,
+    target: PathBuf,
+    file: File,
+    renamed: bool,
+}
+
+impl Prepared {
+    fn create(path: &Path) -> Result<Self, WriteError> {
+        // A link is followed, so that the file it points to is replaced and the link stays.
+        let target = match fs::symlink_metadata(path) {
+            Ok(meta) if meta.is_symlink() => fs::canonicalize(path)?,
+            _ => path.to_path_buf(),
+        };
+        if fs::metadata(&target).is_ok_and(|meta| !meta.is_file()) {
+            return Err(WriteError::NotAFile);
+        }
+        let Some(name) = target.file_name() else { return Err(WriteError::NotAFile) };
+        let folder = match target.parent() {
+            Some(parent) if !parent.as_os_str().is_empty() => parent,
+            _ => Path::new("."),
+        };
+        if !folder.is_dir() {
+            return Err(WriteError::NoFolder { folder: folder.display().to_string() });
+        }
+        let temporary = folder.join(temporary_name(name));
+        let file = OpenOptions::new().write(true).create_new(true).open(&temporary)?;
+        Ok(Self { temporary, target, file, renamed: false })
+    }
+
+    fn fill(&mut self, bytes: &[u8]) -> Result<(), WriteError> {
+        self.file.write_all(bytes)?;
+        Ok(self.file.sync_all()?)
+    }
+
+    fn rename(mut self) -> Result<(), WriteError> {
+        fs::rename(&self.temporary, &self.target)?;
+        self.renamed = true;
+        Ok(())
+    }
+}
+
+impl Drop for Prepared {
+    fn drop(&mut self) {
+        if !self.renamed {
+            // Nothing more can be done about a temporary file that will not go.
+            let _ = fs::remove_file(&self.temporary);
+        }
+    }
+}
+
+fn temporary_name(name: &std::ffi::OsStr) -> OsString {
+    // Process and counter keep two writers of the same target apart.
+    static COUNTER: AtomicU64 = AtomicU64::new(0);
+    let count = COUNTER.fetch_add(1, Ordering::Relaxed);
+    let mut temporary = OsString::from(".");
+    temporary.push(name);
+    temporary.push(format!(".{}-{count}.tmp", std::process::id()));
+    temporary
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_failing_file_leaves_the_others_untouched() {
+        let folder = tempfile::tempdir().unwrap();
+        let (old, other) = (folder.path().join("old.txt"), folder.path().join("new.txt"));
+        fs::write(&old, "before").unwrap();
+        let missing = folder.path().join("nowhere").join("x.txt");
+        let error = write_files(&[(&old, b"after"), (&other, b"x"), (&missing, b"y")]).unwrap_err();
+        assert!(error.to_string().contains("does not exist"), "{error}");
+        assert_eq!(fs::read(&old).unwrap(), b"before");
+        assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 1);
+        write_files(&[(&old, b"after"), (&other, b"x")]).unwrap();
+        assert_eq!(fs::read(&old).unwrap(), b"after");
+        assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 2);
+    }
+
+    #[test]
+    fn folders_and_devices_are_refused() {
+        let folder = tempfile::tempdir().unwrap();
+        assert_eq!(check_writable(folder.path()), Err(WriteError::NotAFile));
+        assert_eq!(check_writable(Path::new("/dev/null")), Err(WriteError::NotAFile));
+        assert_eq!(read_bytes(folder.path()), Err(ReadError::NotAFile));
+        assert_eq!(read_bytes(Path::new("/dev/zero")), Err(ReadError::NotAFile));
+        assert!(matches!(read_bytes(Path::new("/no/such")), Err(ReadError::Io { .. })));
+        assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 0);
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn a_link_stays_a_link() {
+        let folder = tempfile::tempdir().unwrap();
+        let (file, link) = (folder.path().join("a"), folder.path().join("b"));
+        fs::write(&file, "before").unwrap();
+        std::os::unix::fs::symlink(&file, &link).unwrap();
+        write_files(&[(&link, b"after")]).unwrap();
+        assert!(fs::symlink_metadata(&link).unwrap().is_symlink());
+        assert_eq!(fs::read(&file).unwrap(), b"after");
+    }
+
+    #[test]
+    fn text_must_be_utf8() {
+        let error = into_text(vec![b'a', 0xff]).unwrap_err();
+        assert_eq!(error.to_string(), "byte 1: the text is not UTF-8; save the file as UTF-8");
+        assert_eq!(into_text("\u{feff}v 1".into()).unwrap(), "v 1");
+    }
+}

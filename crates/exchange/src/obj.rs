@@ -1,0 +1,296 @@
+//! Wavefront OBJ: polygons with groups, polylines and points. Texture coordinates, normals and
+//! materials are skipped when reading.
+
+use crate::error::ReadError;
+use crate::mesh::{Group, Mesh};
+use geom_core::DVec3;
+use std::collections::HashMap;
+use std::fmt::Write;
+
+/// Reads an OBJ file. Faces, lines and points share one list of vertices, in the order of the file.
+///
+/// # Errors
+/// [`ReadError::Text`] names the first line at fault.
+pub fn read_obj(text: &str) -> Result<(Mesh, Vec<String>), ReadError> {
+    let mut reader = Reader::default();
+    let mut joined = String::new();
+    for (k, line) in text.lines().enumerate() {
+        // A backslash at the end continues the statement on the next line.
+        if let Some(part) = line.trim_end().strip_suffix('\\') {
+            joined.push_str(part);
+            joined.push(' ');
+            continue;
+        }
+        if joined.is_empty() {
+            reader.statement(line, k + 1)?;
+        } else {
+            joined.push_str(line);
+            reader.statement(&joined, k + 1)?;
+            joined.clear();
+        }
+    }
+    reader.statement(&joined, text.lines().count())?;
+    reader.finish()
+}
+
+#[derive(Default)]
+struct Reader {
+    mesh: Mesh,
+    group: String,
+    group_ids: HashMap<String, u32>,
+    corners: Vec<u32>,
+    free_form: Option<usize>,
+}
+
+impl Reader {
+    fn statement(&mut self, line: &str, number: usize) -> Result<(), ReadError> {
+        let line = line.split('#').next().unwrap_or_default();
+        let mut words = line.split_ascii_whitespace();
+        match words.next() {
+            Some("v") => self.vertex(words, number),
+            Some("f") => self.face(words, number),
+            Some("l") => self.line(words, number),
+            Some("g" | "o") => {
+                self.group = words.collect::<Vec<_>>().join(" ");
+                Ok(())
+            }
+            Some("curv" | "surf") => {
+                self.free_form.get_or_insert(number);
+                Ok(())
+            }
+            _ => Ok(()),
+        }
+    }
+
+    fn vertex<'a>(
+        &mut self,
+        mut words: impl Iterator<Item = &'a str>,
+        number: usize,
+    ) -> Result<(), ReadError> {
+        let mut xyz = [0.0_f64; 3];
+        for (value, axis) in xyz.iter_mut().zip(["x", "y", "z"]) {
+            let word = words.next().ok_or_else(|| {
+                let what = format!("vertex without {axis}");
+                ReadError::text(number, what, "a vertex needs three coordinates")
+            })?;
+            *value = coordinate(word, number)?;
+        }
+        if self.mesh.positions.len() >= u32::MAX as usize {
+            return Err(ReadError::text(number, "more than 2^32 vertices", "split the file"));
+        }
+        self.mesh.positions.push(DVec3::from_array(xyz));
+        Ok(())
+    }
+
+    fn face<'a>(
+        &mut self,
+        words: impl Iterator<Item = &'a str>,
+        number: usize,
+    ) -> Result<(), ReadError> {
+        self.indices(words, number)?;
+        let n = self.corners.len();
+        if n < 3 {
+            let what = format!("face with {n} corners");
+            return Err(ReadError::text(number, what, "a face needs at least 3"));
+        }
+        if let Some(twice) = repeated(&self.corners) {
+            let what = format!("the face visits vertex {} twice", twice + 1);
+            return Err(ReadError::text(number, what, "drop or split the face"));
+        }
+        self.mesh.faces.push(&self.corners);
+        let next = self.group_ids.len() as u32;
+        let id = match self.group_ids.get(&self.group) {
+            Some(&id) => id,
+            None => {
+                self.group_ids.insert(self.group.clone(), next);
+                self.mesh.groups.push(Group::new(self.group.clone()));
+                next
+            }
+        };
+        self.mesh.face_groups.push(id);
+        Ok(())
+    }
+
+    fn line<'a>(
+        &mut self,
+        words: impl Iterator<Item = &'a str>,
+        number: usize,
+    ) -> Result<(), ReadError> {
+        self.indices(words, number)?;
+        if self.corners.len() < 2 {
+            let what = format!("line with {} point", self.corners.len());
+            return Err(ReadError::text(number, what, "a line needs at least 2"));
+        }
+        self.mesh.lines.push(&self.corners);
+        Ok(())
+    }
+
+    /// Vertex numbers into `corners`, counted from 0; negative ones count back from the last.
+    fn indices<'a>(
+        &mut self,
+        words: impl Iterator<Item = &'a str>,
+        number: usize,
+    ) -> Result<(), ReadError> {
+        self.corners.clear();
+        let count = self.mesh.positions.len();
+        for word in words {
+            let vertex = word.split('/').next().unwrap_or_default();
+            let index = vertex.parse::<i64>().ok().and_then(|i| match i {
+                1.. => usize::try_from(i - 1).ok(),
+                0 => None,
+                _ => {
+                    usize::try_from(i.unsigned_abs()).ok().and_then(|back| count.checked_sub(back))
+                }
+            });
+            match index {
+                Some(index) if index < count => self.corners.push(index as u32),
+                _ => {
+                    let what = format!("`{}` names no vertex", clip(word));
+                    let mend = format!("{count} vertices come before this line");
+                    return Err(ReadError::text(number, what, mend));
+                }
+            }
+        }
+        Ok(())
+    }
+
+    fn finish(mut self) -> Result<(Mesh, Vec<String>), ReadError> {
+        let mesh = &mut self.mesh;
+        if mesh.positions.is_empty() {
+            let what = "the file has no vertex";
+            return Err(ReadError::content(what, "export it again as polygons"));
+        }
+        if let [only] = mesh.groups.as_slice() {
+            // One group is no grouping; its name is the name of the object.
+            mesh.name = only.name.clone();
+            mesh.groups.clear();
+            mesh.face_groups.clear();
+        }
+        let warning = |line| format!("line {line}: free-form curves and surfaces are ignored");
+        Ok((self.mesh, self.free_form.map(warning).into_iter().collect()))
+    }
+}
+
+/// The first entry that occurs again, without quadratic cost for huge polygons.
+fn repeated(corners: &[u32]) -> Option<u32> {
+    if corners.len() <= 16 {
+        let again = |&k: &usize| corners[..k].contains(&corners[k]);
+        return (1..corners.len()).find(again).map(|k| corners[k]);
+    }
+    let mut sorted = corners.to_vec();
+    sorted.sort_unstable();
+    sorted.windows(2).find(|pair| pair[0] == pair[1]).map(|pair| pair[0])
+}
+
+/// A finite number from a word of a text file.
+pub(crate) fn coordinate(word: &str, line: usize) -> Result<f64, ReadError> {
+    match word.parse::<f64>() {
+        Ok(value) if value.is_finite() => Ok(value),
+        _ => {
+            let what = format!("`{}` is not a finite number", clip(word));
+            Err(ReadError::text(line, what, "write coordinates as decimal numbers"))
+        }
+    }
+}
+
+/// The beginning of a word, fit for a message.
+pub(crate) fn clip(word: &str) -> String {
+    const LONGEST: usize = 24;
+    match word.char_indices().nth(LONGEST) {
+        Some((end, _)) => format!("{}…", &word[..end]),
+        None => word.to_owned(),
+    }
+}
+
+/// OBJ text of several meshes, each an object (if named) with its groups; coordinates are written
+/// so that they read back bit-equal.
+#[must_use]
+pub fn write_obj(meshes: &[Mesh]) -> String {
+    let mut text = String::new();
+    let mut base = 1;
+    for mesh in meshes {
+        write_mesh(&mut text, mesh, base);
+        base += mesh.positions.len();
+    }
+    text
+}
+
+fn write_mesh(text: &mut String, mesh: &Mesh, base: usize) {
+    // Writing into a `String` cannot fail.
+    if !mesh.name.is_empty() {
+        let _ = writeln!(text, "o {}", one_line(&mesh.name));
+    }
+    for p in &mesh.positions {
+        let _ = writeln!(text, "v {:?} {:?} {:?}", p.x, p.y, p.z);
+    }
+    let mut current = None;
+    for (f, corners) in mesh.faces.iter().enumerate() {
+        let group = mesh.face_group(f);
+        if group != current {
+            current = group;
+            let name = group.and_then(|g| mesh.groups.get(g)).map_or("", |g| g.name.as_str());
+            let _ = writeln!(text, "g {}", one_line(name));
+        }
+        indices(text, "f", corners, base);
+    }
+    for line in mesh.lines.iter() {
+        indices(text, "l", line, base);
+    }
+}
+
+fn indices(text: &mut String, keyword: &str, list: &[u32], base: usize) {
+    text.push_str(keyword);
+    for &i in list {
+        let _ = write!(text, " {}", i as usize + base);
+    }
+    text.push('\n');
+}
+
+/// A name must not break the line it stands on.
+pub(crate) fn one_line(name: &str) -> String {
+    name.split_whitespace().collect::<Vec<_>>().join(" ").replace('#', "_")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn quads_groups_lines_and_negative_indices() {
+        let text = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0.5 # half up\ng left\nf 1/1/1 2/2/2 -2//3 \\\n -1\n\
+                    g right\nf 1 2 3\nl 1 3 -1\nvn 0 0 1\n";
+        let (mesh, warnings) = read_obj(text).unwrap();
+        assert_eq!(mesh.faces.iter().collect::<Vec<_>>(), [&[0, 1, 2, 3][..], &[0, 1, 2]]);
+        assert_eq!(mesh.lines.get(0), [0, 2, 3]);
+        assert_eq!(mesh.groups, [Group::new("left"), Group::new("right")]);
+        assert_eq!(mesh.face_groups, [0, 1]);
+        assert_eq!(mesh.positions[3], DVec3::new(0.0, 1.0, 0.5));
+        assert!(warnings.is_empty());
+        assert_eq!(read_obj(&write_obj(std::slice::from_ref(&mesh))).unwrap().0, mesh);
+    }
+
+    #[test]
+    fn faults_name_line_and_mend() {
+        let v = "v 0 0 0\nv 1 0 0\nv 0 1 0\n";
+        let cases = [
+            (
+                "f 1 2 99999999999\n",
+                "line 4: `99999999999` names no vertex; 3 vertices come before this line",
+            ),
+            ("f -7 1 2\n", "line 4: `-7` names no vertex"),
+            ("f 0 1 2\n", "line 4: `0` names no vertex"),
+            ("f 1 1 1\n", "line 4: the face visits vertex 1 twice; drop or split the face"),
+            ("f 1 2\n", "line 4: face with 2 corners; a face needs at least 3"),
+            ("l 1\n", "line 4: line with 1 point"),
+            ("v 0 nan 0\n", "line 4: `nan` is not a finite number"),
+            ("v 0 1e999 0\n", "line 4: `1e999` is not a finite number"),
+            ("v 0 1\n", "line 4: vertex without z; a vertex needs three coordinates"),
+            ("f -9223372036854775808 1 2\n", "line 4: `-9223372036854775808` names no vertex"),
+        ];
+        for (line, want) in cases {
+            let message = read_obj(&format!("{v}{line}")).unwrap_err().to_string();
+            assert!(message.starts_with(want), "{line}: {message}");
+        }
+        assert!(read_obj("").unwrap_err().to_string().contains("no vertex"));
+    }
+}
