@@ -1,0 +1,9 @@
+//! Nonlinear least squares: Levenberg-Marquardt and guided projection.
+
+mod gram;
+mod normal;
+mod solve;
+mod system;
+
+pub use solve::{Iteration, solve, solve_observed, solve_system};
+pub use system::{StepModel, System};

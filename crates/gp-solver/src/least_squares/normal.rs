@@ -1,0 +1,296 @@
+//! The normal matrix `JᵀJ` and gradient `Jᵀr`, formed element by element along a plan.
+
+use std::ops::Range;
+
+use super::gram::{gram_into, padded};
+use crate::error::SolverError;
+use crate::linear::{Factor, Storage};
+use crate::options::Factorization;
+use crate::problem::{Block, Elements, Problem};
+
+/// Mark of a fixed unknown.
+const FIXED: u32 = u32::MAX;
+
+/// Consecutive positions of an element's sorted columns.
+#[derive(Clone, Copy)]
+struct Run {
+    begin: u32,
+    end: u32,
+}
+
+/// What is known of a block before any value is: which columns are free, in which order they
+/// stand in the system, and where their products go.
+#[derive(Default)]
+struct BlockPlan {
+    starts: Vec<usize>,
+    /// Column within the element, sorted by position.
+    local: Vec<u32>,
+    /// Position in the system.
+    position: Vec<u32>,
+    run_starts: Vec<usize>,
+    runs: Vec<Run>,
+    /// For compressed columns: where each (column, run) product begins.
+    target_starts: Vec<usize>,
+    targets: Vec<u32>,
+}
+
+/// Pattern, order and scatter of the normal equations; made once per topology.
+pub(crate) struct NormalPlan {
+    /// Unknown of each position.
+    pub(crate) variable: Vec<usize>,
+    blocks: Vec<BlockPlan>,
+    stride: Option<usize>,
+}
+
+/// Memory of the element products.
+#[derive(Default)]
+pub(crate) struct Scratch {
+    packed: Vec<f64>,
+    product: Vec<f64>,
+}
+
+impl BlockPlan {
+    fn new(elements: &Elements, position: &[u32]) -> Self {
+        let mut plan = Self { starts: vec![0], run_starts: vec![0], ..Self::default() };
+        let mut columns = Vec::new();
+        for e in 0..elements.len() {
+            columns.clear();
+            for (local, &column) in elements.columns(e).iter().enumerate() {
+                if position[column] != FIXED {
+                    columns.push((position[column], local as u32));
+                }
+            }
+            columns.sort_unstable();
+            for (k, &(p, local)) in columns.iter().enumerate() {
+                plan.position.push(p);
+                plan.local.push(local);
+                let last = plan.runs.len();
+                if k > 0 && columns[k - 1].0 + 1 == p {
+                    plan.runs[last - 1].end += 1;
+                } else {
+                    plan.runs.push(Run { begin: k as u32, end: k as u32 + 1 });
+                }
+            }
+            plan.starts.push(plan.position.len());
+            plan.run_starts.push(plan.runs.len());
+        }
+        plan
+    }
+
+    fn len(&self) -> usize {
+        self.starts.len() - 1
+    }
+
+    fn range(&self, e: usize) -> Range<usize> {
+        self.starts[e]..self.starts[e + 1]
+    }
+
+    fn positions(&self, e: usize) -> &[u32] {
+        &self.position[self.range(e)]
+    }
+
+    fn runs(&self, e: usize) -> &[Run] {
+        &self.runs[self.run_starts[e]..self.run_starts[e + 1]]
+    }
+
+    /// Looks up where the products go in compressed columns.
+    fn plan_targets(&mut self, slot: impl Fn(usize, usize) -> usize) {
+        self.target_starts = vec![0];
+        for e in 0..self.len() {
+            let positions = &self.position[self.range(e)];
+            let runs = &self.runs[self.run_starts[e]..self.run_starts[e + 1]];
+            for b in 0..positions.len() {
+                for run in runs.iter().filter(|run| run.end as usize > b) {
+                    let a = b.max(run.begin as usize);
+                    self.targets.push(slot(positions[a] as usize, positions[b] as usize) as u32);
+                }
+            }
+            self.target_starts.push(self.targets.len());
+        }
+    }
+}
+
+impl NormalPlan {
+    /// Plans the normal equations of a problem and chooses their factorisation.
+    pub(crate) fn new(
+        problem: &Problem<'_>,
+        wanted: Factorization,
+    ) -> Result<(Self, Factor), SolverError> {
+        let natural: Vec<usize> = match &problem.order {
+            Some(order) => order.iter().copied().filter(|&i| !problem.fixed[i]).collect(),
+            None => (0..problem.unknowns).filter(|&i| !problem.fixed[i]).collect(),
+        };
+        let blocks_at = |variable: &[usize]| -> Vec<BlockPlan> {
+            let mut position = vec![FIXED; problem.unknowns];
+            for (k, &i) in variable.iter().enumerate() {
+                position[i] = k as u32;
+            }
+            problem.blocks.iter().map(|b| BlockPlan::new(b.elements(), &position)).collect()
+        };
+        let mut variable = natural;
+        let mut blocks = blocks_at(&variable);
+        let cliques = blocks.iter().flat_map(|b| (0..b.len()).map(|e| b.positions(e)));
+        let (factor, order) = Factor::choose(variable.len(), cliques, wanted)?;
+        if let Some(order) = order {
+            variable = order.iter().map(|&k| variable[k]).collect();
+            blocks = blocks_at(&variable);
+        }
+        if u32::try_from(factor.values_len()).is_err() {
+            return Err(SolverError::TooLarge { entries: factor.values_len() });
+        }
+        let stride = match factor.storage() {
+            Storage::Band { stride } => Some(stride),
+            Storage::Columns(pattern) => {
+                for block in &mut blocks {
+                    block.plan_targets(|i, j| {
+                        pattern.slot(i, j).expect("the pattern was made from these elements")
+                    });
+                }
+                None
+            }
+        };
+        Ok((Self { variable, blocks, stride }, factor))
+    }
+
+    /// Number of free unknowns.
+    pub(crate) fn size(&self) -> usize {
+        self.variable.len()
+    }
+
+    /// Adds `Jᵀr` of a block to the gradient and, if given, `JᵀJ` to the matrix values.
+    pub(crate) fn add_rows(
+        &self,
+        block: usize,
+        elements: &Elements,
+        jacobian: &[f64],
+        residuals: &[f64],
+        gradient: &mut [f64],
+        mut values: Option<&mut [f64]>,
+        scratch: &mut Scratch,
+    ) {
+        let plan = &self.blocks[block];
+        for e in 0..plan.len() {
+            let range = plan.range(e);
+            let local = &plan.local[range.clone()];
+            let positions = &plan.position[range];
+            let (k, width) = (local.len(), elements.columns(e).len());
+            let rows = elements.rows(e);
+            if k == 0 || rows.is_empty() {
+                continue;
+            }
+            let jacobian = &jacobian[elements.jacobian_range(e)];
+            let residuals = &residuals[rows];
+            let Some(values) = values.as_deref_mut() else {
+                for (row, &r) in jacobian.chunks_exact(width).zip(residuals) {
+                    for (&c, &p) in local.iter().zip(positions) {
+                        gradient[p as usize] += row[c as usize] * r;
+                    }
+                }
+                continue;
+            };
+            // The residual goes along as one more column, so that the product's last row is Jᵀr.
+            let stride = padded(k + 1);
+            scratch.packed.clear();
+            scratch.packed.resize(stride * residuals.len(), 0.0);
+            for ((row, &r), packed) in jacobian
+                .chunks_exact(width)
+                .zip(residuals)
+                .zip(scratch.packed.chunks_exact_mut(stride))
+            {
+                for (to, &c) in packed.iter_mut().zip(local) {
+                    *to = row[c as usize];
+                }
+                packed[k] = r;
+            }
+            gram_into(&scratch.packed, stride, k + 1, &mut scratch.product);
+            for (b, &p) in positions.iter().enumerate() {
+                gradient[p as usize] += scratch.product[b * stride + k];
+            }
+            self.scatter(block, e, &scratch.product, stride, values);
+        }
+    }
+
+    /// Adds element gradients and Hessians of an energy block.
+    pub(crate) fn add_energy(
+        &self,
+        block: usize,
+        elements: &Elements,
+        hessians: &[f64],
+        gradients: &[f64],
+        gradient: &mut [f64],
+        values: &mut [f64],
+        scratch: &mut Scratch,
+    ) {
+        let plan = &self.blocks[block];
+        for e in 0..plan.len() {
+            let range = plan.range(e);
+            let (local, positions) = (&plan.local[range.clone()], &plan.position[range]);
+            let (k, width) = (local.len(), elements.columns(e).len());
+            let hessian = &hessians[elements.jacobian_range(e)];
+            let gradients = &gradients[elements.rows(e)];
+            scratch.product.clear();
+            scratch.product.resize(k * k, 0.0);
+            for (b, (&cb, &p)) in local.iter().zip(positions).enumerate() {
+                gradient[p as usize] += gradients[cb as usize];
+                for (a, &ca) in local.iter().enumerate().skip(b) {
+                    scratch.product[b * k + a] = hessian[ca as usize * width + cb as usize];
+                }
+            }
+            self.scatter(block, e, &scratch.product, k, values);
+        }
+    }
+
+    /// Adds the lower triangle of an element's product, column `b` at `product[b * stride..]`.
+    fn scatter(&self, block: usize, e: usize, product: &[f64], stride: usize, values: &mut [f64]) {
+        let plan = &self.blocks[block];
+        let positions = plan.positions(e);
+        let runs = plan.runs(e);
+        let mut first = 0;
+        let mut targets = match self.stride {
+            Some(_) => [].iter(),
+            None => plan.targets[plan.target_starts[e]..plan.target_starts[e + 1]].iter(),
+        };
+        for (b, &column) in positions.iter().enumerate() {
+            if runs[first].end as usize <= b {
+                first += 1;
+            }
+            for run in &runs[first..] {
+                let a = b.max(run.begin as usize);
+                let target = match self.stride {
+                    Some(stride) => column as usize * stride + positions[a] as usize,
+                    None => targets.next().map_or(0, |&t| t as usize),
+                };
+                let from = &product[b * stride + a..b * stride + run.end as usize];
+                for (to, &value) in values[target..target + from.len()].iter_mut().zip(from) {
+                    *to += value;
+                }
+            }
+        }
+    }
+
+    /// The Jacobian of all residual blocks over the free unknowns, as (row, position, value).
+    pub(crate) fn triplets<'s>(
+        &'s self,
+        block: usize,
+        elements: &'s Elements,
+        jacobian: &'s [f64],
+    ) -> impl Iterator<Item = (usize, usize, f64)> + 's {
+        let plan = &self.blocks[block];
+        (0..plan.len()).flat_map(move |e| {
+            let range = plan.range(e);
+            let width = elements.columns(e).len();
+            let begin = elements.jacobian_range(e).start;
+            elements.rows(e).enumerate().flat_map(move |(r, row)| {
+                range.clone().map(move |k| {
+                    let value = jacobian[begin + r * width + plan.local[k] as usize];
+                    (row, plan.position[k] as usize, value)
+                })
+            })
+        })
+    }
+}
+
+/// Whether a block's matrix part is the same at every iterate.
+pub(crate) fn is_constant(block: &Block<'_>) -> bool {
+    matches!(block, Block::Residual(rows) if rows.is_linear())
+}

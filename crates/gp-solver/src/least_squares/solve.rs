@@ -1,0 +1,295 @@
+//! The iteration.
+
+use std::ops::ControlFlow;
+use std::time::Instant;
+
+use super::system::{StepModel, System};
+use crate::error::SolverError;
+use crate::options::{Method, Options};
+use crate::problem::Problem;
+use crate::report::{IterationRecord, Report, Status};
+
+/// Damping beyond which no step is worth trying.
+const MAX_DAMPING: f64 = 1e16;
+/// Damping below which it makes no difference in 64-bit numbers.
+const MIN_DAMPING: f64 = 1e-16;
+/// Least share of the predicted decrease a step must bring.
+const MIN_GAIN: f64 = 1e-4;
+
+/// What an observer sees after each taken step (and once at the start).
+#[derive(Clone, Copy, Debug)]
+pub struct Iteration<'s> {
+    /// Steps taken so far.
+    pub iteration: usize,
+    /// The iterate.
+    pub x: &'s [f64],
+    /// Its record.
+    pub record: &'s IterationRecord,
+    /// Damping the next step begins with.
+    pub damping: f64,
+}
+
+/// Minimises a problem from `x`, which then holds the result.
+///
+/// # Errors
+/// [`SolverError`] for what cannot be attempted; not converging is a [`Status`].
+pub fn solve(
+    problem: Problem<'_>,
+    x: &mut [f64],
+    options: &Options,
+) -> Result<Report, SolverError> {
+    solve_observed(problem, x, options, |_| ControlFlow::Continue(()))
+}
+
+/// As [`solve`], calling `observer` at the start and after every taken step; it can stop the solve,
+/// which leaves the iterate it was shown.
+///
+/// # Errors
+/// As [`solve`].
+pub fn solve_observed(
+    problem: Problem<'_>,
+    x: &mut [f64],
+    options: &Options,
+    observer: impl FnMut(&Iteration<'_>) -> ControlFlow<()>,
+) -> Result<Report, SolverError> {
+    options.check()?;
+    let mut system = System::new(problem, options.factorization)?;
+    solve_system(&mut system, x, options, observer)
+}
+
+/// As [`solve_observed`] on a planned system, which can be solved again from elsewhere.
+///
+/// # Errors
+/// As [`solve`].
+pub fn solve_system(
+    system: &mut System<'_>,
+    x: &mut [f64],
+    options: &Options,
+    observer: impl FnMut(&Iteration<'_>) -> ControlFlow<()>,
+) -> Result<Report, SolverError> {
+    options.check()?;
+    if let Some(variable) = x.iter().position(|v| !v.is_finite()) {
+        return Err(SolverError::StartNotFinite { variable, value: x[variable] });
+    }
+    let begin = Instant::now();
+    let before = (system.factorizations(), system.timings());
+    let mut run = Run::new(system, x, options, observer)?;
+    let status = run.iterate()?;
+    let Run { history, gradient_norm, damping, .. } = run;
+    let mut timings = system.timings();
+    timings.residuals -= before.1.residuals;
+    timings.linearize -= before.1.linearize;
+    timings.normal -= before.1.normal;
+    timings.factor -= before.1.factor;
+    timings.solve -= before.1.solve;
+    timings.total = begin.elapsed();
+    let last = &history[history.len() - 1];
+    let terms = system
+        .problem()
+        .block_names()
+        .zip(&last.terms)
+        .map(|(name, &energy)| crate::report::Term { name: name.to_owned(), energy })
+        .collect();
+    Ok(Report {
+        status,
+        iterations: history.len() - 1,
+        initial_energy: history[0].energy,
+        final_energy: last.energy,
+        terms,
+        factorizations: system.factorizations() - before.0,
+        gradient_norm,
+        damping,
+        variables: system.variables(),
+        rows: system.rows(),
+        timings,
+        history,
+    })
+}
+
+/// A solve under way.
+struct Run<'s, 'a, F> {
+    system: &'s mut System<'a>,
+    x: &'s mut [f64],
+    options: &'s Options,
+    observer: F,
+    trial: Vec<f64>,
+    history: Vec<IterationRecord>,
+    damping: f64,
+    /// Factor by which the next refusal raises the damping.
+    growth: f64,
+    gradient_norm: f64,
+}
+
+/// A taken step.
+struct Taken {
+    model: StepModel,
+    actual_decrease: f64,
+    damping: f64,
+    factorizations: usize,
+}
+
+impl<'s, 'a, F: FnMut(&Iteration<'_>) -> ControlFlow<()>> Run<'s, 'a, F> {
+    fn new(
+        system: &'s mut System<'a>,
+        x: &'s mut [f64],
+        options: &'s Options,
+        observer: F,
+    ) -> Result<Self, SolverError> {
+        system.refresh(x);
+        system.linearize(x)?;
+        let start = IterationRecord {
+            energy: system.energy(),
+            terms: system.term_energies().to_vec(),
+            damping: 0.0,
+            step_norm: 0.0,
+            gradient_norm: system.scaled_gradient_norm(),
+            factorizations: 0,
+        };
+        Ok(Self {
+            trial: x.to_vec(),
+            gradient_norm: start.gradient_norm,
+            history: vec![start],
+            damping: options.initial_damping,
+            growth: 2.0,
+            system,
+            x,
+            options,
+            observer,
+        })
+    }
+
+    fn iterate(&mut self) -> Result<Status, SolverError> {
+        if self.observe().is_break() {
+            return Ok(Status::Interrupted);
+        }
+        loop {
+            if self.gradient_norm <= self.options.gradient_tol
+                || self.system.energy() <= self.options.abs_energy_tol
+            {
+                return Ok(Status::Converged);
+            }
+            if self.history.len() > self.options.max_iterations {
+                return Ok(Status::IterationLimit);
+            }
+            let taken = match self.options.method {
+                Method::LevenbergMarquardt => self.damped_step()?,
+                Method::GuidedProjection { epsilon } => self.projection_step(epsilon)?,
+            };
+            let taken = match taken {
+                Ok(taken) => taken,
+                Err(status) => return Ok(status),
+            };
+            let energy_before = self.system.energy();
+            let small_step = taken.model.scaled_norm
+                <= self.options.step_tol * self.system.scaled_norm(&self.trial);
+            let small_change = taken.model.predicted_decrease.abs()
+                <= self.options.energy_tol * energy_before
+                && taken.actual_decrease.abs() <= self.options.energy_tol * energy_before;
+            self.take(&taken)?;
+            if self.observe().is_break() {
+                return Ok(Status::Interrupted);
+            }
+            if small_step || small_change {
+                return Ok(Status::Converged);
+            }
+        }
+    }
+
+    /// Levenberg-Marquardt: raises the damping until a step lowers the energy. Nielsen's rule:
+    /// after success `μ ← μ max(1/3, 1 − (2ϱ − 1)³)`, after the k-th refusal in a row `μ ← 2ᵏ μ`.
+    fn damped_step(&mut self) -> Result<Result<Taken, Status>, SolverError> {
+        let energy = self.system.energy();
+        let mut factorizations = 0;
+        loop {
+            factorizations += 1;
+            let damping = self.damping;
+            let model = match self.system.damped_step(damping) {
+                Ok(model) => Some(model),
+                // Damping mends an indefinite or singular matrix, like any bad step.
+                Err(SolverError::NotPositiveDefinite { .. }) => None,
+                Err(other) => return Err(other),
+            };
+            let mut decrease = f64::NAN;
+            if let Some(model) = model {
+                self.system.stepped_into(self.x, &mut self.trial);
+                decrease = energy - self.system.energy_at(&self.trial);
+                let gain = decrease / model.predicted_decrease;
+                if decrease >= 0.0 && gain >= MIN_GAIN {
+                    let factor = (1.0 - (2.0 * gain - 1.0).powi(3)).clamp(1.0 / 3.0, 2.0);
+                    self.damping = (damping * factor).max(MIN_DAMPING);
+                    self.growth = 2.0;
+                    return Ok(Ok(Taken {
+                        model,
+                        actual_decrease: decrease,
+                        damping,
+                        factorizations,
+                    }));
+                }
+                // So short a step cannot change the iterate: this is as low as it gets.
+                let short = model.scaled_norm <= f64::EPSILON * self.system.scaled_norm(self.x);
+                let flat = model.predicted_decrease <= self.options.energy_tol * energy
+                    && decrease.abs() <= self.options.energy_tol * energy;
+                if short || flat {
+                    return Ok(Err(Status::Converged));
+                }
+            }
+            self.damping = damping * self.growth;
+            self.growth *= 2.0;
+            tracing::trace!(damping, decrease, "step refused");
+            if !(self.damping <= MAX_DAMPING) {
+                self.damping = MAX_DAMPING;
+                return Ok(Err(Status::Stalled));
+            }
+        }
+    }
+
+    /// Guided projection: the step is taken whatever it does.
+    fn projection_step(&mut self, epsilon: f64) -> Result<Result<Taken, Status>, SolverError> {
+        let model = self.system.projection_step(epsilon)?;
+        self.system.stepped_into(self.x, &mut self.trial);
+        if !self.trial.iter().all(|v| v.is_finite()) {
+            return Ok(Err(Status::Stalled));
+        }
+        let actual_decrease = self.system.energy() - self.system.energy_at(&self.trial);
+        if !actual_decrease.is_finite() {
+            return Ok(Err(Status::Stalled));
+        }
+        Ok(Ok(Taken { model, actual_decrease, damping: epsilon, factorizations: 1 }))
+    }
+
+    /// Moves to the trial point, refreshes and linearises there.
+    fn take(&mut self, taken: &Taken) -> Result<(), SolverError> {
+        let step_norm = self.system.step().iter().map(|s| s * s).sum::<f64>().sqrt();
+        self.x.copy_from_slice(&self.trial);
+        self.system.refresh(self.x);
+        let energy = self.system.linearize(self.x)?;
+        let record = IterationRecord {
+            energy,
+            terms: self.system.term_energies().to_vec(),
+            damping: taken.damping,
+            step_norm,
+            gradient_norm: self.gradient_norm,
+            factorizations: taken.factorizations,
+        };
+        self.gradient_norm = self.system.scaled_gradient_norm();
+        tracing::debug!(
+            iteration = self.history.len(),
+            energy,
+            terms = ?record.terms,
+            step = step_norm,
+            damping = taken.damping,
+            gradient = self.gradient_norm,
+        );
+        self.history.push(record);
+        Ok(())
+    }
+
+    fn observe(&mut self) -> ControlFlow<()> {
+        (self.observer)(&Iteration {
+            iteration: self.history.len() - 1,
+            x: self.x,
+            record: &self.history[self.history.len() - 1],
+            damping: self.damping,
+        })
+    }
+}

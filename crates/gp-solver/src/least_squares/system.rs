@@ -1,0 +1,484 @@
+//! A problem linearised at an iterate, and single steps from it.
+
+use std::time::Instant;
+
+use super::normal::{NormalPlan, Scratch, is_constant};
+use crate::error::SolverError;
+use crate::linear::Factor;
+use crate::options::Factorization;
+use crate::problem::{Block, Problem, Quantity};
+use crate::report::{Term, Timings};
+
+/// Residuals and derivatives of one block.
+#[derive(Default)]
+struct BlockValues {
+    residuals: Vec<f64>,
+    /// Jacobian of a residual block, Hessians of an energy block.
+    derivatives: Vec<f64>,
+    linearized: bool,
+}
+
+/// A planned problem: patterns, ordering and symbolic factorisation are made once, then the
+/// problem is linearised and stepped any number of times.
+///
+/// This is what the solvers stand on; it is public for callers that drive their own iteration.
+pub struct System<'a> {
+    problem: Problem<'a>,
+    plan: NormalPlan,
+    factor: Factor,
+    values: Vec<BlockValues>,
+    /// Matrix part of the linear blocks.
+    constant: Vec<f64>,
+    matrix: Vec<f64>,
+    gradient: Vec<f64>,
+    diagonal: Vec<f64>,
+    terms: Vec<f64>,
+    trial: Vec<f64>,
+    shift: Vec<f64>,
+    step: Vec<f64>,
+    scratch: Scratch,
+    energy: f64,
+    factorizations: usize,
+    timings: Timings,
+}
+
+/// What the linear model says of a step.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct StepModel {
+    /// Decrease of the energy the linear model foresees.
+    pub predicted_decrease: f64,
+    /// `‖s‖_D` with `D = diag A`.
+    pub scaled_norm: f64,
+}
+
+impl<'a> System<'a> {
+    /// Checks and plans a problem.
+    ///
+    /// # Errors
+    /// What [`SolverError`] says of malformed blocks and orderings.
+    pub fn new(problem: Problem<'a>, factorization: Factorization) -> Result<Self, SolverError> {
+        let begin = Instant::now();
+        problem.check()?;
+        let (plan, factor) = NormalPlan::new(&problem, factorization)?;
+        let values = problem
+            .blocks
+            .iter()
+            .map(|block| BlockValues {
+                residuals: vec![0.0; block.elements().rows_total()],
+                derivatives: vec![0.0; block.elements().jacobian_len()],
+                linearized: false,
+            })
+            .collect();
+        let n = plan.size();
+        Ok(Self {
+            values,
+            constant: vec![0.0; factor.values_len()],
+            matrix: vec![0.0; factor.values_len()],
+            gradient: vec![0.0; n],
+            diagonal: vec![0.0; n],
+            terms: vec![0.0; problem.blocks.len()],
+            trial: vec![0.0; problem.blocks.len()],
+            shift: vec![0.0; n],
+            step: vec![0.0; n],
+            scratch: Scratch::default(),
+            energy: f64::NAN,
+            factorizations: 0,
+            timings: Timings { plan: begin.elapsed(), ..Timings::default() },
+            problem,
+            plan,
+            factor,
+        })
+    }
+
+    /// The problem.
+    #[must_use]
+    pub fn problem(&self) -> &Problem<'a> {
+        &self.problem
+    }
+
+    /// Gives the problem back.
+    #[must_use]
+    pub fn into_problem(self) -> Problem<'a> {
+        self.problem
+    }
+
+    /// Number of free unknowns.
+    #[must_use]
+    pub fn variables(&self) -> usize {
+        self.plan.size()
+    }
+
+    /// Number of residual rows.
+    #[must_use]
+    pub fn rows(&self) -> usize {
+        let rows = |(block, values): (&Block<'_>, &BlockValues)| match block {
+            Block::Residual(_) => values.residuals.len(),
+            Block::Energy(_) => 0,
+        };
+        self.problem.blocks.iter().zip(&self.values).map(rows).sum()
+    }
+
+    /// The factorisation in use: `band` or `sparse`.
+    #[must_use]
+    pub fn factorization(&self) -> &'static str {
+        self.factor.name()
+    }
+
+    /// The unknown behind each position of the system.
+    #[must_use]
+    pub fn order(&self) -> &[usize] {
+        &self.plan.variable
+    }
+
+    /// Gradient of the energy at the last linearisation, by position.
+    #[must_use]
+    pub fn gradient(&self) -> &[f64] {
+        &self.gradient
+    }
+
+    /// Diagonal of the normal matrix at the last linearisation, by position; where it is zero
+    /// the unknown's natural size stands in.
+    #[must_use]
+    pub fn diagonal(&self) -> &[f64] {
+        &self.diagonal
+    }
+
+    /// The last step, by position.
+    #[must_use]
+    pub fn step(&self) -> &[f64] {
+        &self.step
+    }
+
+    /// Factorisations so far.
+    #[must_use]
+    pub fn factorizations(&self) -> usize {
+        self.factorizations
+    }
+
+    /// Time spent so far.
+    #[must_use]
+    pub fn timings(&self) -> Timings {
+        self.timings
+    }
+
+    /// Energy at the last linearisation.
+    #[must_use]
+    pub fn energy(&self) -> f64 {
+        self.energy
+    }
+
+    /// Energies of the blocks at the last linearisation.
+    #[must_use]
+    pub fn terms(&self) -> Vec<Term> {
+        let term = |(b, &energy): (&Block<'_>, &f64)| Term { name: b.name().to_owned(), energy };
+        self.problem.blocks.iter().zip(&self.terms).map(term).collect()
+    }
+
+    pub(crate) fn term_energies(&self) -> &[f64] {
+        &self.terms
+    }
+
+    /// Lets the blocks update their lagged quantities.
+    pub fn refresh(&mut self, x: &[f64]) {
+        for block in &mut self.problem.blocks {
+            block.refresh(x);
+        }
+    }
+
+    /// Evaluates the blocks at `x`, forms normal matrix and gradient; returns the energy.
+    ///
+    /// # Errors
+    /// [`SolverError::NotFinite`] names block and row, [`SolverError::WrongLength`].
+    pub fn linearize(&mut self, x: &[f64]) -> Result<f64, SolverError> {
+        self.check_length(x)?;
+        let begin = Instant::now();
+        for (b, block) in self.problem.blocks.iter().enumerate() {
+            let values = &mut self.values[b];
+            self.terms[b] = match block {
+                Block::Residual(rows) => {
+                    if values.linearized && rows.is_linear() {
+                        rows.residuals(x, &mut values.residuals);
+                    } else {
+                        rows.linearize(x, &mut values.residuals, &mut values.derivatives);
+                    }
+                    half_square(&values.residuals)
+                }
+                Block::Energy(energy) => {
+                    energy.quadratic_model(x, &mut values.residuals, &mut values.derivatives)
+                }
+            };
+            check_finite(block, values, self.terms[b])?;
+        }
+        self.energy = self.terms.iter().sum();
+        self.timings.linearize += begin.elapsed();
+        let begin = Instant::now();
+        self.form();
+        self.timings.normal += begin.elapsed();
+        Ok(self.energy)
+    }
+
+    fn form(&mut self) {
+        for (b, block) in self.problem.blocks.iter().enumerate() {
+            let values = &mut self.values[b];
+            if is_constant(block) && !values.linearized {
+                // Zero rows are not worth a thought: the gradient is formed below.
+                let mut unused = vec![0.0; self.plan.size()];
+                self.plan.add_rows(
+                    b,
+                    block.elements(),
+                    &values.derivatives,
+                    &values.residuals,
+                    &mut unused,
+                    Some(&mut self.constant),
+                    &mut self.scratch,
+                );
+                values.linearized = true;
+            }
+        }
+        self.matrix.copy_from_slice(&self.constant);
+        self.gradient.fill(0.0);
+        for (b, block) in self.problem.blocks.iter().enumerate() {
+            let values = &self.values[b];
+            match block {
+                Block::Residual(_) => self.plan.add_rows(
+                    b,
+                    block.elements(),
+                    &values.derivatives,
+                    &values.residuals,
+                    &mut self.gradient,
+                    (!values.linearized).then_some(&mut self.matrix[..]),
+                    &mut self.scratch,
+                ),
+                Block::Energy(_) => self.plan.add_energy(
+                    b,
+                    block.elements(),
+                    &values.derivatives,
+                    &values.residuals,
+                    &mut self.gradient,
+                    &mut self.matrix,
+                    &mut self.scratch,
+                ),
+            }
+        }
+        for i in 0..self.plan.size() {
+            let a = self.matrix[self.factor.diagonal_slot(i)];
+            let size = self.problem.scale[self.plan.variable[i]];
+            self.diagonal[i] = if a > 0.0 { a } else { 1.0 / (size * size) };
+        }
+    }
+
+    /// The energy at `x`, infinite or NaN where a block is; leaves the linearisation alone.
+    pub fn energy_at(&mut self, x: &[f64]) -> f64 {
+        let begin = Instant::now();
+        for (b, block) in self.problem.blocks.iter().enumerate() {
+            self.trial[b] = match block {
+                Block::Residual(rows) => {
+                    // The linearisation has used the residuals up, so their memory is free.
+                    let residuals = &mut self.values[b].residuals;
+                    rows.residuals(x, residuals);
+                    half_square(residuals)
+                }
+                Block::Energy(energy) => energy.energy(x),
+            };
+        }
+        self.timings.residuals += begin.elapsed();
+        self.trial.iter().sum()
+    }
+
+    /// Solves `(A + μ diag A) s = −g` at the last linearisation; the step is then in
+    /// [`step`](Self::step).
+    ///
+    /// # Errors
+    /// [`SolverError::NotPositiveDefinite`] names the unknown.
+    pub fn damped_step(&mut self, damping: f64) -> Result<StepModel, SolverError> {
+        for (s, &d) in self.shift.iter_mut().zip(&self.diagonal) {
+            *s = damping * d;
+        }
+        self.shifted_step()
+    }
+
+    /// Solves `(A + ε² I) s = −g` at the last linearisation, distances in the unknowns' scale.
+    ///
+    /// # Errors
+    /// [`SolverError::NotPositiveDefinite`] names the unknown.
+    pub fn projection_step(&mut self, epsilon: f64) -> Result<StepModel, SolverError> {
+        for (s, &i) in self.shift.iter_mut().zip(&self.plan.variable) {
+            *s = (epsilon / self.problem.scale[i]).powi(2);
+        }
+        self.shifted_step()
+    }
+
+    fn shifted_step(&mut self) -> Result<StepModel, SolverError> {
+        let begin = Instant::now();
+        self.factorizations += 1;
+        let result = self.factor.factor(&self.matrix, &self.shift);
+        self.timings.factor += begin.elapsed();
+        if let Err(error) = result {
+            return Err(match error {
+                SolverError::NotPositiveDefinite { variable } => {
+                    SolverError::NotPositiveDefinite { variable: self.plan.variable[variable] }
+                }
+                other => other,
+            });
+        }
+        let begin = Instant::now();
+        for (s, &g) in self.step.iter_mut().zip(&self.gradient) {
+            *s = -g;
+        }
+        self.factor.solve_in_place(&mut self.step);
+        self.timings.solve += begin.elapsed();
+        // m(0) − m(s) = −g·s − ½ s·A s with A s = −g − shift·s.
+        let mut decrease = 0.0;
+        let mut square = 0.0;
+        for i in 0..self.step.len() {
+            let s = self.step[i];
+            decrease += 0.5 * s * (self.shift[i] * s - self.gradient[i]);
+            square += self.diagonal[i] * s * s;
+        }
+        Ok(StepModel { predicted_decrease: decrease, scaled_norm: square.sqrt() })
+    }
+
+    /// `out = x + step`, fixed unknowns unchanged.
+    ///
+    /// # Panics
+    /// If the lengths differ from the number of unknowns.
+    pub fn stepped_into(&self, x: &[f64], out: &mut [f64]) {
+        out.copy_from_slice(x);
+        for (&s, &i) in self.step.iter().zip(&self.plan.variable) {
+            out[i] += s;
+        }
+    }
+
+    /// `‖x‖_D` over the free unknowns.
+    #[must_use]
+    pub fn scaled_norm(&self, x: &[f64]) -> f64 {
+        let term = |(&i, &d): (&usize, &f64)| d * x[i] * x[i];
+        self.plan.variable.iter().zip(&self.diagonal).map(term).sum::<f64>().sqrt()
+    }
+
+    /// `max_i |g_i| / √(A_ii · 2E)`, 0 where the energy is.
+    #[must_use]
+    pub fn scaled_gradient_norm(&self) -> f64 {
+        if self.energy == 0.0 {
+            return 0.0;
+        }
+        let scale = 2.0 * self.energy.abs();
+        let cosine = |(&g, &d): (&f64, &f64)| g.abs() / (d * scale).sqrt();
+        self.gradient.iter().zip(&self.diagonal).map(cosine).fold(0.0, f64::max)
+    }
+
+    /// The normal matrix at the last linearisation, dense and by position (for tests and small
+    /// problems): `out[i * n + j]`.
+    #[must_use]
+    pub fn dense_matrix(&self) -> Vec<f64> {
+        let n = self.plan.size();
+        let mut out = vec![0.0; n * n];
+        let mut put = |i: usize, j: usize, value: f64| {
+            out[i * n + j] = value;
+            out[j * n + i] = value;
+        };
+        match &self.factor {
+            Factor::Band(band) => {
+                for j in 0..n {
+                    for i in j..n.min(j + band.half_bandwidth() + 1) {
+                        put(i, j, self.matrix[band.slot(i, j)]);
+                    }
+                }
+            }
+            Factor::Sparse { cholesky, .. } => {
+                let pattern = cholesky.pattern();
+                for j in 0..n {
+                    for k in pattern.column_starts()[j]..pattern.column_starts()[j + 1] {
+                        put(pattern.rows()[k], j, self.matrix[k]);
+                    }
+                }
+            }
+        }
+        out
+    }
+
+    /// The Jacobian of all residual rows at the last linearisation, columns by position.
+    #[must_use]
+    pub fn jacobian(&self) -> sprs::CsMat<f64> {
+        let mut triplets = sprs::TriMat::new((self.rows(), self.variables()));
+        let mut first = 0;
+        for (b, block) in self.problem.blocks.iter().enumerate() {
+            let Block::Residual(rows) = block else { continue };
+            let elements = rows.elements();
+            for (i, j, value) in self.plan.triplets(b, elements, &self.values[b].derivatives) {
+                triplets.add_triplet(first + i, j, value);
+            }
+            first += elements.rows_total();
+        }
+        triplets.to_csc()
+    }
+
+    fn check_length(&self, x: &[f64]) -> Result<(), SolverError> {
+        if x.len() == self.problem.unknowns {
+            return Ok(());
+        }
+        let (expected, found) = (self.problem.unknowns, x.len());
+        Err(SolverError::WrongLength { what: "the vector of unknowns", expected, found })
+    }
+}
+
+/// `½ Σ r²`.
+fn half_square(residuals: &[f64]) -> f64 {
+    // Eight sums side by side: a fixed order that the compiler can vectorise.
+    let mut sums = [0.0; 8];
+    let chunks = residuals.chunks_exact(8);
+    let rest: f64 = chunks.remainder().iter().map(|r| r * r).sum();
+    for chunk in chunks {
+        for (sum, r) in sums.iter_mut().zip(chunk) {
+            *sum += r * r;
+        }
+    }
+    0.5 * (sums.iter().sum::<f64>() + rest)
+}
+
+/// Whether all values are finite, in one pass without branches: `0 · v` is NaN otherwise.
+fn all_finite(values: &[f64]) -> bool {
+    let mut sums = [0.0; 8];
+    let chunks = values.chunks_exact(8);
+    let rest: f64 = chunks.remainder().iter().map(|v| 0.0 * v).sum();
+    for chunk in chunks {
+        for (sum, v) in sums.iter_mut().zip(chunk) {
+            *sum += 0.0 * v;
+        }
+    }
+    sums.iter().sum::<f64>() + rest == 0.0
+}
+
+fn check_finite(block: &Block<'_>, values: &BlockValues, energy: f64) -> Result<(), SolverError> {
+    if energy.is_finite() && all_finite(&values.residuals) && all_finite(&values.derivatives) {
+        return Ok(());
+    }
+    let elements = block.elements();
+    let is_rows = matches!(block, Block::Residual(_));
+    let fault = |row: usize, quantity: Quantity, value: f64| {
+        Err(SolverError::NotFinite { block: block.name().to_owned(), row, quantity, value })
+    };
+    for e in 0..elements.len() {
+        let columns = elements.columns(e);
+        for (r, row) in elements.rows(e).enumerate() {
+            let value = values.residuals[row];
+            if !value.is_finite() {
+                let quantity = if is_rows { Quantity::Residual } else { Quantity::Gradient };
+                return fault(row, quantity, value);
+            }
+            let begin = elements.jacobian_range(e).start + r * columns.len();
+            for (k, &column) in columns.iter().enumerate() {
+                let value = values.derivatives[begin + k];
+                if !value.is_finite() {
+                    let quantity =
+                        if is_rows { Quantity::Derivative(column) } else { Quantity::Hessian };
+                    return fault(row, quantity, value);
+                }
+            }
+        }
+    }
+    // Finite rows whose squares overflow.
+    let value = |row: &usize| values.residuals[*row].abs();
+    let row = (0..values.residuals.len()).max_by(|a, b| value(a).total_cmp(&value(b)));
+    fault(row.unwrap_or(0), Quantity::Energy, energy)
+}

@@ -1,0 +1,128 @@
+//! One interface to the two factorisations, and the choice between them.
+
+use super::ordering::{half_bandwidth, reverse_cuthill_mckee};
+use super::{BandCholesky, SparseCholesky, SymmetricPattern};
+use crate::error::SolverError;
+use crate::options::Factorization;
+
+/// Speeds of the two factorisations (flops per second) their costs are compared with. Only the
+/// ratio matters; measured on AVX2 and AVX-512 machines.
+const BAND_SPEED: f64 = 40e9;
+const SPARSE_SPEED: f64 = 12e9;
+/// Seconds the sparse factorisation spends per stored value of the factor besides arithmetic.
+const SPARSE_OVERHEAD: f64 = 2e-9;
+/// A band with at least this share of structural nonzeros is taken without a look at the
+/// sparse alternative.
+const DENSE_BAND: f64 = 0.25;
+/// Systems this small are factored as dense.
+const SMALL: usize = 64;
+
+/// A factorisation that fits the structure.
+pub(crate) enum Factor {
+    Band(BandCholesky),
+    Sparse { cholesky: SparseCholesky, shifted: Vec<f64> },
+}
+
+/// Where the values of the normal matrix stand.
+pub(crate) enum Storage<'a> {
+    Band { stride: usize },
+    Columns(&'a SymmetricPattern),
+}
+
+impl Factor {
+    /// Chooses a factorisation for the pattern whose cliques are `groups` (positions in the
+    /// natural order, each sorted). Returns it with the order to use: `order[k]` is the natural
+    /// position that comes `k`-th, or `None` for the natural order.
+    pub(crate) fn choose<'a>(
+        size: usize,
+        groups: impl Iterator<Item = &'a [u32]> + Clone,
+        wanted: Factorization,
+    ) -> Result<(Self, Option<Vec<usize>>), SolverError> {
+        let span = |g: &[u32]| g.last().zip(g.first()).map_or(0, |(b, a)| (b - a) as usize);
+        let natural_kd = groups.clone().map(span).max().unwrap_or(0);
+        if size <= SMALL && wanted != Factorization::Sparse {
+            return Ok((Self::Band(BandCholesky::new(size, natural_kd)), None));
+        }
+        let pattern = SymmetricPattern::from_cliques(size, groups);
+        let fill = pattern.len() as f64 / (size * (natural_kd + 1)).max(1) as f64;
+        if fill >= DENSE_BAND && wanted != Factorization::Sparse {
+            return Ok((Self::Band(BandCholesky::new(size, natural_kd)), None));
+        }
+        let seconds = |kd: usize| size as f64 * (kd as f64).powi(2) / BAND_SPEED;
+        let mut band = (natural_kd, None);
+        if wanted != Factorization::Sparse {
+            let order = reverse_cuthill_mckee(&pattern);
+            let mut position = vec![0; size];
+            for (k, &i) in order.iter().enumerate() {
+                position[i] = k;
+            }
+            let kd = half_bandwidth(&pattern, &position);
+            // The caller's order stays unless the other is clearly better.
+            if seconds(kd) < 0.8 * seconds(natural_kd) {
+                band = (kd, Some(order));
+            }
+        }
+        if wanted == Factorization::Band {
+            return Ok((Self::Band(BandCholesky::new(size, band.0)), band.1));
+        }
+        let cholesky = SparseCholesky::new(pattern)?;
+        let sparse_seconds =
+            cholesky.flops() / SPARSE_SPEED + cholesky.factor_len() as f64 * SPARSE_OVERHEAD;
+        if wanted != Factorization::Sparse && seconds(band.0) < sparse_seconds {
+            return Ok((Self::Band(BandCholesky::new(size, band.0)), band.1));
+        }
+        Ok((Self::Sparse { cholesky, shifted: Vec::new() }, None))
+    }
+
+    pub(crate) fn storage(&self) -> Storage<'_> {
+        match self {
+            Self::Band(band) => Storage::Band { stride: band.slot(0, 1) },
+            Self::Sparse { cholesky, .. } => Storage::Columns(cholesky.pattern()),
+        }
+    }
+
+    pub(crate) fn values_len(&self) -> usize {
+        match self {
+            Self::Band(band) => band.values_len(),
+            Self::Sparse { cholesky, .. } => cholesky.pattern().len(),
+        }
+    }
+
+    /// Where diagonal entry `i` stands.
+    pub(crate) fn diagonal_slot(&self, i: usize) -> usize {
+        match self {
+            Self::Band(band) => band.slot(i, i),
+            Self::Sparse { cholesky, .. } => cholesky.pattern().column_starts()[i],
+        }
+    }
+
+    /// Factors `A + diag(shift)`.
+    pub(crate) fn factor(&mut self, values: &[f64], shift: &[f64]) -> Result<(), SolverError> {
+        match self {
+            Self::Band(band) => band.factor(values, shift),
+            Self::Sparse { cholesky, shifted } => {
+                shifted.clear();
+                shifted.extend_from_slice(values);
+                let starts = cholesky.pattern().column_starts();
+                for (i, &s) in shift.iter().enumerate() {
+                    shifted[starts[i]] += s;
+                }
+                cholesky.factor(shifted)
+            }
+        }
+    }
+
+    pub(crate) fn solve_in_place(&self, rhs: &mut [f64]) {
+        match self {
+            Self::Band(band) => band.solve_in_place(rhs),
+            Self::Sparse { cholesky, .. } => cholesky.solve_in_place(rhs),
+        }
+    }
+
+    pub(crate) fn name(&self) -> &'static str {
+        match self {
+            Self::Band(_) => "band",
+            Self::Sparse { .. } => "sparse",
+        }
+    }
+}

@@ -1,0 +1,12 @@
+//! Factorisations of symmetric positive definite matrices, chosen by structure.
+
+mod band;
+mod factor;
+mod ordering;
+mod pattern;
+mod sparse;
+
+pub use band::BandCholesky;
+pub(crate) use factor::{Factor, Storage};
+pub use pattern::SymmetricPattern;
+pub use sparse::SparseCholesky;

@@ -1,0 +1,123 @@
+//! The sparsity of a symmetric matrix.
+
+use crate::error::SolverError;
+
+/// Lower triangle of a symmetric pattern, compressed by columns: the rows of a column are sorted
+/// and start with the diagonal, which is always there (kept by `new`).
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct SymmetricPattern {
+    column_starts: Vec<usize>,
+    rows: Vec<usize>,
+}
+
+impl SymmetricPattern {
+    /// Pattern of a `size × size` matrix with the given entries and the diagonal. Entries of either
+    /// triangle are taken and stand for both; repetitions are merged.
+    ///
+    /// # Errors
+    /// [`SolverError::EntryOutOfRange`].
+    pub fn new(
+        size: usize,
+        entries: impl IntoIterator<Item = (usize, usize)>,
+    ) -> Result<Self, SolverError> {
+        let mut columns: Vec<Vec<usize>> = (0..size).map(|j| vec![j]).collect();
+        for (row, column) in entries {
+            if row >= size || column >= size {
+                return Err(SolverError::EntryOutOfRange { row, column, size });
+            }
+            if row != column {
+                columns[row.min(column)].push(row.max(column));
+            }
+        }
+        let mut pattern = Self { column_starts: vec![0], rows: Vec::new() };
+        for column in &mut columns {
+            column.sort_unstable();
+            column.dedup();
+            pattern.rows.extend_from_slice(column);
+            pattern.column_starts.push(pattern.rows.len());
+        }
+        Ok(pattern)
+    }
+
+    /// Pattern in which each group's members are pairwise coupled.
+    pub(crate) fn from_cliques<'a>(size: usize, groups: impl Iterator<Item = &'a [u32]>) -> Self {
+        let mut columns: Vec<Vec<u32>> = (0..size as u32).map(|j| vec![j]).collect();
+        for group in groups {
+            for (k, &j) in group.iter().enumerate() {
+                let column = &mut columns[j as usize];
+                column.extend_from_slice(&group[k..]);
+                // Merging now and then keeps the memory near that of the final pattern.
+                if column.len() > 1024 && column.len().is_power_of_two() {
+                    column.sort_unstable();
+                    column.dedup();
+                }
+            }
+        }
+        let mut pattern = Self { column_starts: vec![0], rows: Vec::new() };
+        for mut column in columns {
+            column.sort_unstable();
+            column.dedup();
+            pattern.rows.extend(column.iter().map(|&i| i as usize));
+            pattern.column_starts.push(pattern.rows.len());
+        }
+        pattern
+    }
+
+    /// Number of rows and columns.
+    #[must_use]
+    pub fn size(&self) -> usize {
+        self.column_starts.len() - 1
+    }
+
+    /// Number of stored entries (lower triangle).
+    #[must_use]
+    pub fn len(&self) -> usize {
+        self.rows.len()
+    }
+
+    /// Whether the matrix has no row.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.rows.is_empty()
+    }
+
+    /// Where each column's entries begin, and the total at the end.
+    #[must_use]
+    pub fn column_starts(&self) -> &[usize] {
+        &self.column_starts
+    }
+
+    /// Row of every stored entry.
+    #[must_use]
+    pub fn rows(&self) -> &[usize] {
+        &self.rows
+    }
+
+    /// Where the value of entry `(row, column)` or its mirror image stands.
+    #[must_use]
+    pub fn slot(&self, row: usize, column: usize) -> Option<usize> {
+        let (i, j) = (row.max(column), row.min(column));
+        let start = *self.column_starts.get(j)?;
+        let end = *self.column_starts.get(j + 1)?;
+        self.rows[start..end].binary_search(&i).ok().map(|k| start + k)
+    }
+
+    /// `out = A x` for the matrix with these stored values.
+    ///
+    /// # Panics
+    /// If a slice has the wrong length.
+    pub fn multiply(&self, values: &[f64], x: &[f64], out: &mut [f64]) {
+        assert_eq!(values.len(), self.len(), "one value per stored entry");
+        assert!(x.len() == self.size() && out.len() == self.size(), "one value per row");
+        out.fill(0.0);
+        for j in 0..self.size() {
+            let start = self.column_starts[j];
+            out[j] += values[start] * x[j];
+            for k in start + 1..self.column_starts[j + 1] {
+                let i = self.rows[k];
+                out[i] += values[k] * x[j];
+                out[j] += values[k] * x[i];
+            }
+        }
+    }
+}

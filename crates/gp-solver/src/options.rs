@@ -1,0 +1,101 @@
+//! Settings of the least-squares solvers.
+
+use crate::error::SolverError;
+
+/// How a step is made from the linearised problem.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
+pub enum Method {
+    /// Levenberg-Marquardt: `(A + μ D) s = −g` with `D = diag A`, steps that raise the energy are
+    /// refused, and the damping `μ` follows the ratio of actual to predicted decrease.
+    LevenbergMarquardt,
+    /// Undamped guided projection (Pellis et al. 2021, Eq. 11): `(A + ε² I) s = −g`, every step
+    /// taken. Nothing keeps the energy from rising.
+    GuidedProjection {
+        /// Weight `ε` of the distance to the last iterate, in units of the unknowns' scale.
+        epsilon: f64,
+    },
+}
+
+/// Which factorisation the normal equations get.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum Factorization {
+    /// Band or sparse, whichever the structure makes cheaper.
+    #[default]
+    Auto,
+    /// Our band Cholesky, in the caller's order or reverse Cuthill-McKee.
+    Band,
+    /// faer's supernodal Cholesky in approximate minimum degree order.
+    Sparse,
+}
+
+/// Settings of a least-squares solve. The defaults suit every problem of the published test sets
+/// this crate is proven on.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Options {
+    /// Step rule.
+    pub method: Method,
+    /// Stops with [`IterationLimit`](crate::Status::IterationLimit) once the number of taken
+    /// steps `≥ max_iterations`.
+    pub max_iterations: usize,
+    /// First damping `μ` of Levenberg-Marquardt, a fraction of the diagonal.
+    pub initial_damping: f64,
+    /// Converged if `max_i |g_i| / √(A_ii · 2E) ≤ gradient_tol`: the largest cosine of an angle
+    /// between the residual and a column of the Jacobian.
+    pub gradient_tol: f64,
+    /// Converged if a taken step has `‖s‖_D ≤ step_tol · ‖x‖_D`, with `D = diag A`.
+    pub step_tol: f64,
+    /// Converged if both the predicted and the actual decrease of a taken step are
+    /// `≤ energy_tol · E`.
+    pub energy_tol: f64,
+    /// Converged if `E ≤ abs_energy_tol`.
+    pub abs_energy_tol: f64,
+    /// Which factorisation to use.
+    pub factorization: Factorization,
+}
+
+impl Default for Options {
+    fn default() -> Self {
+        Self {
+            method: Method::LevenbergMarquardt,
+            max_iterations: 200,
+            initial_damping: 1e-3,
+            gradient_tol: 1e-10,
+            step_tol: 1e-10,
+            energy_tol: 1e-14,
+            abs_energy_tol: 0.0,
+            factorization: Factorization::Auto,
+        }
+    }
+}
+
+impl Options {
+    /// Guided projection as published, with weight `epsilon` of the last iterate.
+    #[must_use]
+    pub fn guided_projection(epsilon: f64) -> Self {
+        Self { method: Method::GuidedProjection { epsilon }, ..Self::default() }
+    }
+
+    pub(crate) fn check(&self) -> Result<(), SolverError> {
+        let not_negative = [
+            ("gradient_tol", self.gradient_tol),
+            ("step_tol", self.step_tol),
+            ("energy_tol", self.energy_tol),
+            ("abs_energy_tol", self.abs_energy_tol),
+        ];
+        for (name, value) in not_negative {
+            if !(value >= 0.0) {
+                return Err(SolverError::BadOption { name, value, need: "zero or more" });
+            }
+        }
+        let (name, value) = match self.method {
+            Method::LevenbergMarquardt => ("initial_damping", self.initial_damping),
+            Method::GuidedProjection { epsilon } => ("epsilon", epsilon),
+        };
+        if !(value > 0.0 && value.is_finite()) {
+            return Err(SolverError::BadOption { name, value, need: "positive and finite" });
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,123 @@
+//! What a solve says about itself.
+
+use std::fmt;
+use std::time::Duration;
+
+/// How a solve ended. Only the words differ from success to failure: the iterate is usable in
+/// every case.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Status {
+    /// A stop rule of [`Options`](crate::Options) was met.
+    Converged,
+    /// No further decrease was possible although no stop rule was met.
+    Stalled,
+    /// The allowed number of iterations was used up.
+    IterationLimit,
+    /// The observer asked to stop.
+    Interrupted,
+    /// The constraints contradict one another.
+    Infeasible,
+}
+
+impl Status {
+    /// The name used in metrics: lower snake case.
+    #[must_use]
+    pub fn as_str(self) -> &'static str {
+        match self {
+            Self::Converged => "converged",
+            Self::Stalled => "stalled",
+            Self::IterationLimit => "iteration_limit",
+            Self::Interrupted => "interrupted",
+            Self::Infeasible => "infeasible",
+        }
+    }
+}
+
+impl fmt::Display for Status {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(self.as_str())
+    }
+}
+
+/// The energy of one term.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Term {
+    /// Name of the block.
+    pub name: String,
+    /// Its energy, weights included.
+    pub energy: f64,
+}
+
+/// One iteration as the history keeps it; entry 0 is the start.
+#[derive(Clone, Debug, PartialEq)]
+pub struct IterationRecord {
+    /// Energy of the iterate.
+    pub energy: f64,
+    /// Energy of each term, in the order of the blocks.
+    pub terms: Vec<f64>,
+    /// Damping of the step that led here; 0 for the start.
+    pub damping: f64,
+    /// Euclidean length of the step that led here.
+    pub step_norm: f64,
+    /// Scaled gradient norm (see [`Options::gradient_tol`](crate::Options::gradient_tol)) where
+    /// the step began.
+    pub gradient_norm: f64,
+    /// Factorisations this step took: one and the number of refused trials.
+    pub factorizations: usize,
+}
+
+/// Wall-clock time per phase.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Timings {
+    /// Planning: patterns, orderings, symbolic factorisation.
+    pub plan: Duration,
+    /// Residuals of trial steps.
+    pub residuals: Duration,
+    /// Refreshes, residuals and Jacobians of iterates.
+    pub linearize: Duration,
+    /// Normal matrix and gradient.
+    pub normal: Duration,
+    /// Numeric factorisation.
+    pub factor: Duration,
+    /// Triangular solves.
+    pub solve: Duration,
+    /// The whole solve, planning excluded.
+    pub total: Duration,
+}
+
+/// What a solve did.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Report {
+    /// How it ended.
+    pub status: Status,
+    /// Steps taken.
+    pub iterations: usize,
+    /// Energy of the start.
+    pub initial_energy: f64,
+    /// Energy of the result.
+    pub final_energy: f64,
+    /// Energy of every term at the end.
+    pub terms: Vec<Term>,
+    /// The start and every taken step.
+    pub history: Vec<IterationRecord>,
+    /// Matrix factorisations, refused trials included.
+    pub factorizations: usize,
+    /// Scaled gradient norm at the last linearisation.
+    pub gradient_norm: f64,
+    /// Damping after the last step, to go on from.
+    pub damping: f64,
+    /// Unknowns that are not fixed.
+    pub variables: usize,
+    /// Rows of all residual blocks.
+    pub rows: usize,
+    /// Time per phase.
+    pub timings: Timings,
+}
+
+impl Report {
+    /// Wall-clock milliseconds per taken step (the whole solve if none was taken).
+    #[must_use]
+    pub fn ms_per_iteration(&self) -> f64 {
+        1e3 * self.timings.total.as_secs_f64() / self.iterations.max(1) as f64
+    }
+}

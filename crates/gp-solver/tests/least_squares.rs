@@ -1,0 +1,205 @@
+//! The solvers on problems with known answers.
+
+use gp_solver::{
+    Elements, EnergyBlock, Factorization, Options, Problem, QuadraticBuilder, ResidualBlock,
+    SolverError, Status, System, solve, solve_observed,
+};
+use std::ops::ControlFlow;
+
+/// `r = (10 (y − x²), 1 − x)`.
+struct Rosenbrock(Elements);
+
+impl Rosenbrock {
+    fn new() -> Self {
+        let mut elements = Elements::new();
+        elements.push(&[0, 1], 2);
+        Self(elements)
+    }
+}
+
+impl ResidualBlock for Rosenbrock {
+    fn name(&self) -> &str {
+        "rosenbrock"
+    }
+    fn elements(&self) -> &Elements {
+        &self.0
+    }
+    fn residuals(&self, x: &[f64], r: &mut [f64]) {
+        r[0] = 10.0 * (x[1] - x[0] * x[0]);
+        r[1] = 1.0 - x[0];
+    }
+    fn linearize(&self, x: &[f64], r: &mut [f64], j: &mut [f64]) {
+        self.residuals(x, r);
+        j.copy_from_slice(&[-20.0 * x[0], 10.0, -1.0, 0.0]);
+    }
+}
+
+#[test]
+fn rosenbrock_is_solved_by_either_factorization() {
+    for factorization in [Factorization::Auto, Factorization::Band, Factorization::Sparse] {
+        let mut problem = Problem::new(2);
+        problem.add(Rosenbrock::new());
+        let mut x = [-1.2, 1.0];
+        let options = Options { factorization, ..Options::default() };
+        let report = solve(problem, &mut x, &options).unwrap();
+        assert_eq!(report.status, Status::Converged);
+        assert!(report.final_energy < 1e-20, "{report:?}");
+        assert!((x[0] - 1.0).abs() < 1e-9 && (x[1] - 1.0).abs() < 1e-9);
+    }
+}
+
+#[test]
+fn energy_never_rises_over_accepted_steps() {
+    let mut problem = Problem::new(2);
+    problem.add(Rosenbrock::new());
+    let report = solve(problem, &mut [-1.2, 1.0], &Options::default()).unwrap();
+    for pair in report.history.windows(2) {
+        assert!(pair[1].energy <= pair[0].energy);
+    }
+}
+
+#[test]
+fn fixed_unknowns_leave_the_system() {
+    let mut problem = Problem::new(2);
+    problem.add(Rosenbrock::new()).fix(0);
+    let mut x = [2.0, 0.0];
+    let report = solve(problem, &mut x, &Options::default()).unwrap();
+    assert_eq!(report.variables, 1);
+    assert_eq!(x[0], 2.0);
+    assert!((x[1] - 4.0).abs() < 1e-6, "{x:?}");
+}
+
+#[test]
+fn observer_interrupts_and_leaves_the_iterate_it_was_shown() {
+    let mut problem = Problem::new(2);
+    problem.add(Rosenbrock::new());
+    let mut x = [-1.2, 1.0];
+    let mut shown = [0.0; 2];
+    let report = solve_observed(problem, &mut x, &Options::default(), |it| {
+        shown.copy_from_slice(it.x);
+        if it.iteration == 2 { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+    })
+    .unwrap();
+    assert_eq!(report.status, Status::Interrupted);
+    assert_eq!(report.iterations, 2);
+    assert_eq!(x, shown);
+}
+
+/// The same sphere once as rows and once as an energy with a Gauss-Newton Hessian.
+struct SphereEnergy(Elements);
+
+impl EnergyBlock for SphereEnergy {
+    fn name(&self) -> &str {
+        "sphere"
+    }
+    fn elements(&self) -> &Elements {
+        &self.0
+    }
+    fn energy(&self, x: &[f64]) -> f64 {
+        0.5 * (x.iter().map(|v| v * v).sum::<f64>() - 1.0).powi(2)
+    }
+    fn quadratic_model(&self, x: &[f64], g: &mut [f64], h: &mut [f64]) -> f64 {
+        let r = x.iter().map(|v| v * v).sum::<f64>() - 1.0;
+        for i in 0..3 {
+            g[i] = 2.0 * r * x[i];
+            for j in 0..3 {
+                h[3 * i + j] = 4.0 * x[i] * x[j];
+            }
+        }
+        0.5 * r * r
+    }
+}
+
+#[test]
+fn energy_blocks_equal_residual_blocks() {
+    let start = [0.3, -0.4, 2.0];
+    let mut elements = Elements::new();
+    elements.push(&[0, 1, 2], 3);
+    let mut by_energy = Problem::new(3);
+    by_energy.add_energy(SphereEnergy(elements));
+    let mut rows = QuadraticBuilder::new("sphere");
+    let row = rows.equation(1.0).constant(-1.0);
+    for i in 0..3 {
+        row.product(i, i, 1.0);
+    }
+    let mut by_rows = Problem::new(3);
+    by_rows.add(rows.build());
+    let mut a = System::new(by_energy, Factorization::Auto).unwrap();
+    let mut b = System::new(by_rows, Factorization::Auto).unwrap();
+    assert!((a.linearize(&start).unwrap() - b.linearize(&start).unwrap()).abs() < 1e-14);
+    for (x, y) in a.dense_matrix().iter().zip(b.dense_matrix()) {
+        assert!((x - y).abs() < 1e-14);
+    }
+    let (ma, mb) = (a.damped_step(1e-3).unwrap(), b.damped_step(1e-3).unwrap());
+    assert!((ma.predicted_decrease - mb.predicted_decrease).abs() < 1e-12);
+    for (x, y) in a.step().iter().zip(b.step()) {
+        assert!((x - y).abs() < 1e-12);
+    }
+}
+
+#[test]
+fn guided_projection_meets_quadratic_constraints() {
+    let mut rows = QuadraticBuilder::new("circle and line");
+    rows.equation(1.0).product(0, 0, 1.0).product(1, 1, 1.0).constant(-25.0);
+    rows.equation(1.0).linear(0, 1.0).linear(1, -7.0).constant(25.0);
+    let mut problem = Problem::new(2);
+    problem.add(rows.build());
+    let mut x = [4.0, 3.0];
+    let report = solve(problem, &mut x, &Options::guided_projection(1e-3)).unwrap();
+    assert_eq!(report.status, Status::Converged);
+    assert!((x[0] - 3.0).abs() < 1e-9 && (x[1] - 4.0).abs() < 1e-9, "{x:?}");
+}
+
+struct Faulty(Elements, f64, f64);
+
+impl ResidualBlock for Faulty {
+    fn name(&self) -> &str {
+        "faulty"
+    }
+    fn elements(&self) -> &Elements {
+        &self.0
+    }
+    fn residuals(&self, _: &[f64], r: &mut [f64]) {
+        r.copy_from_slice(&[1.0, 2.0, self.1]);
+    }
+    fn linearize(&self, x: &[f64], r: &mut [f64], j: &mut [f64]) {
+        self.residuals(x, r);
+        j.fill(1.0);
+        j[3] = self.2;
+    }
+}
+
+#[test]
+fn a_nan_is_caught_at_its_block_and_row() {
+    let mut elements = Elements::new();
+    elements.push(&[0, 1], 3);
+    let mut problem = Problem::new(2);
+    problem.add(Faulty(elements.clone(), f64::NAN, 1.0));
+    let error = solve(problem, &mut [0.0; 2], &Options::default()).unwrap_err();
+    assert!(error.to_string().starts_with("the residual of row 2 of block `faulty` is NaN"));
+    let mut problem = Problem::new(2);
+    problem.add(Faulty(elements, 1.0, f64::INFINITY));
+    let error = solve(problem, &mut [0.0; 2], &Options::default()).unwrap_err();
+    assert!(
+        error
+            .to_string()
+            .starts_with("the derivative by unknown 1 of row 1 of block `faulty` is inf"),
+        "{error}"
+    );
+}
+
+#[test]
+fn malformed_blocks_are_named() {
+    let mut elements = Elements::new();
+    elements.push(&[0, 2], 3);
+    let mut problem = Problem::new(2);
+    problem.add(Faulty(elements, 0.0, 0.0));
+    let error = solve(problem, &mut [0.0; 2], &Options::default()).unwrap_err();
+    assert!(matches!(error, SolverError::ColumnOutOfRange { column: 2, unknowns: 2, .. }));
+    let mut elements = Elements::new();
+    elements.push(&[1, 1], 3);
+    let mut problem = Problem::new(2);
+    problem.add(Faulty(elements, 0.0, 0.0));
+    let error = solve(problem, &mut [0.0; 2], &Options::default()).unwrap_err();
+    assert!(matches!(error, SolverError::RepeatedColumn { column: 1, .. }));
+}
