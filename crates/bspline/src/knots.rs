@@ -67,6 +67,12 @@ pub enum KnotError {
          for degree {degree}; drop the surplus knots or split the spline"
     )]
     OverRepeated { value: f64, found: usize, allowed: usize, degree: usize },
+    /// A knot to insert that lies outside the domain.
+    #[error("knot {value} lies outside the domain [{start}, {end}]; move it inside")]
+    Outside { value: f64, start: f64, end: f64 },
+    /// A degree below the present one.
+    #[error("degree {degree} cannot become {wanted} exactly; refit to lower the degree")]
+    Lowered { degree: usize, wanted: usize },
     /// The domain has no length.
     #[error("the domain [{start}, {end}] has no length; spread the knots")]
     EmptyDomain { start: f64, end: f64 },

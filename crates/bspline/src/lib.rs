@@ -7,12 +7,18 @@
 mod basis;
 mod curve;
 mod error;
+mod fit;
 mod knots;
 mod rational;
+mod refine;
 mod surface;
+mod table;
 
 pub use basis::{BasisValues, MAX_DERIVATIVE};
 pub use curve::BsplineCurve;
 pub use error::SplineError;
+pub use fit::{FitError, fit_curve, fit_surface};
 pub use knots::{Degree, KnotError, KnotVector};
+pub use refine::BezierPiece;
 pub use surface::BsplineSurface;
+pub use table::{BasisTable, SampleGrid, SpanSamples};

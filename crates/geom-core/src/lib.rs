@@ -5,19 +5,25 @@
 
 mod bounding_box;
 mod close;
+mod curvature_derivatives;
 mod forms;
+mod isolines;
 mod jet;
+mod least_squares;
 mod poly_mesh;
 mod tri_mesh;
 
 pub use bounding_box::BoundingBox;
 pub use close::assert_close;
+pub use curvature_derivatives::CurvatureDerivatives;
 pub use forms::{
     CurvatureError, FirstForm, PrincipalCurvatures, SINGULAR_RATIO, SecondForm,
     asymptotic_directions, gaussian_curvature, gradient_norm_squared, mean_curvature,
     normal_curvature, principal_curvatures,
 };
 pub use glam::{DMat3, DVec2, DVec3};
+pub use isolines::{Isoline, isolines};
 pub use jet::SurfaceJet;
+pub use least_squares::{RANK_RATIO, RankError, least_squares};
 pub use poly_mesh::{FaceId, HalfEdgeId, MeshError, PolyMesh, VertexId};
 pub use tri_mesh::{ClosestPoint, Foot, Nearest, TriMesh, closest_barycentric, closest_on_segment};
