@@ -1,0 +1,114 @@
+//! Patches that look alike share their evaluation: a class per local connectivity.
+
+use crate::jet::JetWeights;
+use crate::local::{LocalPatch, grid_weights};
+use std::collections::HashMap;
+
+/// How many halvings an evaluation takes at most; a parameter nearer than `2^-48` to an
+/// extraordinary corner is moved off it.
+const MAX_DEPTH: usize = 48;
+
+#[derive(Clone, Debug)]
+struct Class {
+    vertex_count: usize,
+    kind: Kind,
+}
+
+#[derive(Clone, Debug)]
+enum Kind {
+    /// A bi-cubic B-spline patch on combinations of local vertices.
+    Regular(Box<[Vec<(usize, f64)>; 16]>),
+    /// Four sub-patches: class and matrix of the step down to it.
+    Split([(usize, Vec<f64>); 4]),
+    /// Being built.
+    Pending,
+}
+
+/// Local connectivities met so far, with the matrices that lead from one to the next.
+///
+/// An extraordinary corner leads back to its own class (Stam's subdivision matrix powers), every
+/// other sub-patch to a regular one, so a parameter is reached after finitely many steps.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Classes {
+    classes: Vec<Class>,
+    by_key: HashMap<Vec<u64>, usize>,
+}
+
+impl Classes {
+    /// The class of `local`, made if it is new; `None` if its refinement is not a manifold.
+    pub(crate) fn insert(&mut self, local: &LocalPatch) -> Option<usize> {
+        let key = local.key();
+        if let Some(&id) = self.by_key.get(&key) {
+            return Some(id);
+        }
+        let id = self.classes.len();
+        self.by_key.insert(key, id);
+        self.classes.push(Class { vertex_count: local.mesh.vertex_count(), kind: Kind::Pending });
+        self.classes[id].kind = match local.regular_grid() {
+            Some(grid) => Kind::Regular(Box::new(grid)),
+            None => {
+                let [a, b, c, d] = local.children()?;
+                let mut below =
+                    |(local, matrix): (LocalPatch, Vec<f64>)| Some((self.insert(&local)?, matrix));
+                Kind::Split([below(a)?, below(b)?, below(c)?, below(d)?])
+            }
+        };
+        Some(id)
+    }
+
+    pub(crate) fn vertex_count(&self, class: usize) -> usize {
+        self.classes[class].vertex_count
+    }
+
+    /// The B-spline control points of a regular class, see [`LocalPatch::regular_grid`].
+    pub(crate) fn grid(&self, class: usize) -> Option<&[Vec<(usize, f64)>; 16]> {
+        match &self.classes[class].kind {
+            Kind::Regular(grid) => Some(grid),
+            _ => None,
+        }
+    }
+
+    /// Matrix from a class's control points to those of its first sub-patch, if that is of the
+    /// same class: the subdivision matrix of an extraordinary corner.
+    pub(crate) fn subdivision_matrix(&self, class: usize) -> Option<&[f64]> {
+        match &self.classes[class].kind {
+            Kind::Split(below) if below[0].0 == class => Some(&below[0].1),
+            _ => None,
+        }
+    }
+
+    /// Jets of the control points' weights at `(u, v)` in the unit square.
+    pub(crate) fn weights(&self, class: usize, u: f64, v: f64) -> JetWeights {
+        let (mut class, mut u, mut v) = (class, u, v);
+        let mut path: Vec<(usize, &[f64])> = Vec::new();
+        loop {
+            match &self.classes[class].kind {
+                Kind::Regular(grid) => {
+                    let count = self.classes[class].vertex_count;
+                    let mut weights = grid_weights(grid, count, u, v);
+                    weights.rescale((1_u64 << path.len()) as f64);
+                    for &(columns, matrix) in path.iter().rev() {
+                        weights = weights.times(matrix, columns);
+                    }
+                    return weights;
+                }
+                Kind::Split(below) => {
+                    if path.len() == MAX_DEPTH {
+                        (u, v) = (1.0 - u.round(), 1.0 - v.round());
+                    }
+                    let child = match (u < 0.5, v < 0.5) {
+                        (true, true) => 0,
+                        (false, true) => 1,
+                        (false, false) => 2,
+                        (true, false) => 3,
+                    };
+                    u = if u < 0.5 { 2.0 * u } else { 2.0 * u - 1.0 };
+                    v = if v < 0.5 { 2.0 * v } else { 2.0 * v - 1.0 };
+                    path.push((self.classes[class].vertex_count, &below[child].1));
+                    class = below[child].0;
+                }
+                Kind::Pending => unreachable!("a class is finished before it can be evaluated"),
+            }
+        }
+    }
+}

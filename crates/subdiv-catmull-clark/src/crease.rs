@@ -1,0 +1,172 @@
+//! Semi-sharp creases, corners, and the masks they and the boundary ask for.
+
+use geom_core::{HalfEdgeId, PolyMesh, VertexId};
+use std::collections::HashMap;
+
+/// Sharpness of an edge that stays sharp for ever.
+pub const INFINITE_SHARPNESS: f64 = f64::INFINITY;
+
+/// Edge sharpness (DeRose, Kass and Truong 1998) and corners of a control mesh.
+///
+/// An edge of sharpness `s` uses the crease masks for `s` refinements and turns smooth
+/// afterwards; boundary edges are always infinitely sharp and need no entry. A corner vertex is
+/// interpolated. A boundary vertex with a single face is a corner by itself, so that the surface
+/// of a regular grid with boundary is the bi-cubic B-spline with natural ends.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Creases {
+    sharpness: HashMap<(u32, u32), f64>,
+    corners: Vec<VertexId>,
+}
+
+impl Creases {
+    /// No creases and no corners.
+    #[must_use]
+    pub fn none() -> Self {
+        Self::default()
+    }
+
+    /// Sets the sharpness of the edge between two vertices; zero or less makes it smooth.
+    pub fn set(&mut self, a: VertexId, b: VertexId, sharpness: f64) {
+        let key = (a.0.min(b.0), a.0.max(b.0));
+        if sharpness > 0.0 {
+            self.sharpness.insert(key, sharpness);
+        } else {
+            self.sharpness.remove(&key);
+        }
+    }
+
+    /// Makes `v` a corner.
+    pub fn set_corner(&mut self, v: VertexId) {
+        if let Err(at) = self.corners.binary_search(&v) {
+            self.corners.insert(at, v);
+        }
+    }
+
+    /// Sharpness of an edge, boundary not considered.
+    #[must_use]
+    pub fn sharpness(&self, a: VertexId, b: VertexId) -> f64 {
+        self.sharpness.get(&(a.0.min(b.0), a.0.max(b.0))).copied().unwrap_or(0.0)
+    }
+
+    /// Whether `v` was made a corner.
+    #[must_use]
+    pub fn is_corner(&self, v: VertexId) -> bool {
+        self.corners.binary_search(&v).is_ok()
+    }
+}
+
+/// What the masks need to know about a mesh besides its connectivity: sharpness and the mask of
+/// Biermann, Levin and Zorin (2000) per half-edge, corner marks per vertex.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct Tags {
+    /// Per half-edge, the same on both sides of an edge.
+    pub(crate) sharpness: Vec<f64>,
+    /// Per half-edge: how much the weight of its origin in the edge mask exceeds 3/8 (and that of
+    /// its target falls short of it), because the origin is an extraordinary crease vertex.
+    pub(crate) shift: Vec<f64>,
+    pub(crate) corner: Vec<bool>,
+}
+
+impl Tags {
+    pub(crate) fn new(mesh: &PolyMesh, creases: &Creases) -> Self {
+        let mut tags = Self {
+            sharpness: vec![0.0; mesh.half_edge_count()],
+            shift: vec![0.0; mesh.half_edge_count()],
+            corner: mesh.vertices().map(|v| creases.is_corner(v)).collect(),
+        };
+        for h in mesh.edges() {
+            let s = if mesh.is_boundary_edge(h) {
+                INFINITE_SHARPNESS
+            } else {
+                creases.sharpness(mesh.origin(h), mesh.target(h))
+            };
+            tags.sharpness[h.index()] = s;
+            tags.sharpness[mesh.twin(h).index()] = s;
+        }
+        for v in mesh.vertices() {
+            if mesh.is_boundary_vertex(v) && mesh.valence(v) == 2 {
+                tags.corner[v.index()] = true;
+            }
+        }
+        for v in mesh.vertices() {
+            for h in mesh.outgoing_half_edges(v) {
+                if tags.sharpness[h.index()] == 0.0 {
+                    tags.shift[h.index()] = tags.crease_shift(mesh, h);
+                }
+            }
+        }
+        tags
+    }
+
+    /// `cos(θ_k)/4`, from γ = 3/8 − cos(θ_k)/4 of Biermann et al. 2000 (sec. 3.2), where the
+    /// origin of `h` has a sector of `k` faces between two infinitely sharp edges.
+    fn crease_shift(&self, mesh: &PolyMesh, h: HalfEdgeId) -> f64 {
+        let infinite = |h: HalfEdgeId| self.sharpness[h.index()] == INFINITE_SHARPNESS;
+        let v = mesh.origin(h);
+        let sharp = mesh.outgoing_half_edges(v).filter(|&h| infinite(h)).count();
+        if sharp < 2 {
+            return 0.0;
+        }
+        let mut faces = 0;
+        let mut at = h;
+        while !infinite(at) {
+            at = mesh.twin(mesh.prev(at));
+            faces += 1;
+        }
+        at = h;
+        while !infinite(at) {
+            at = mesh.next(mesh.twin(at));
+            faces += 1;
+        }
+        // The regular sectors must come out as exact zeros: they decide what is a B-spline patch.
+        if sharp == 2 && !self.corner[v.index()] {
+            if faces == 2 { 0.0 } else { 0.25 * (std::f64::consts::PI / f64::from(faces)).cos() }
+        } else {
+            // A convex corner, taken as a right angle.
+            0.25 * (std::f64::consts::FRAC_PI_2 / f64::from(faces)).cos()
+        }
+    }
+
+    /// How the vertex rule of `v` mixes its smooth, crease and corner masks.
+    pub(crate) fn vertex_rule(&self, mesh: &PolyMesh, v: VertexId) -> VertexRule {
+        let sharpness = |h: HalfEdgeId| self.sharpness[h.index()];
+        let kind = |level: f64| {
+            let sharp: Vec<_> =
+                mesh.outgoing_half_edges(v).filter(|&h| sharpness(h) > level).collect();
+            match sharp[..] {
+                _ if self.corner[v.index()] => VertexMask::Corner,
+                [] | [_] => VertexMask::Smooth,
+                [a, b] => VertexMask::Crease(mesh.target(a), mesh.target(b)),
+                _ => VertexMask::Corner,
+            }
+        };
+        let (now, next) = (kind(0.0), kind(1.0));
+        let mut fading = 0.0;
+        let mut count = 0.0;
+        for h in mesh.outgoing_half_edges(v) {
+            let s = sharpness(h);
+            if s > 0.0 && s < 1.0 {
+                fading += s;
+                count += 1.0;
+            }
+        }
+        let weight = if now == next || count == 0.0 { 1.0 } else { fading / count };
+        VertexRule { now, next, weight }
+    }
+}
+
+/// Masks of the new position of an old vertex.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) enum VertexMask {
+    Smooth,
+    Crease(VertexId, VertexId),
+    Corner,
+}
+
+/// `weight · now + (1 − weight) · next`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct VertexRule {
+    pub(crate) now: VertexMask,
+    pub(crate) next: VertexMask,
+    pub(crate) weight: f64,
+}

@@ -1,0 +1,307 @@
+//! The polynomial that stands in for the surface near an extraordinary vertex.
+
+use crate::blend::{septic_step, weight_jet};
+use crate::jet::{JET_LEN, Jet, JetWeights, jet_index, jet_product};
+use std::f64::consts::TAU;
+
+/// Total degree of the guide.
+const DEGREE: usize = 5;
+/// Number of monomials up to that degree.
+pub(crate) const MONOMIALS: usize = (DEGREE + 1) * (DEGREE + 2) / 2;
+/// Cells per side and Gauss points per cell side of the integral the guide minimises.
+const CELLS: usize = 4;
+const GAUSS_6: [(f64, f64); 6] = [
+    (0.033_765_242_898_423_99, 0.085_662_246_189_585_17),
+    (0.169_395_306_766_867_74, 0.180_380_786_524_069_3),
+    (0.380_690_406_958_401_55, 0.233_956_967_286_345_52),
+    (0.619_309_593_041_598_5, 0.233_956_967_286_345_52),
+    (0.830_604_693_233_132_3, 0.180_380_786_524_069_3),
+    (0.966_234_757_101_576, 0.085_662_246_189_585_17),
+];
+
+/// Coefficients of the guide as linear functions of the two-ring of an extraordinary vertex.
+///
+/// The guide `q` is the polynomial of degree five in the characteristic coordinates `(ξ, η)` that
+/// minimises `Σ ∫ |∇³ S|² dξ dη` over the patches around the vertex, with
+/// `S = (1 − w) S_CC + w q` and `w` the septic step over the whole ring. As the energy measures
+/// just the third derivatives, this keeps the ripples out of the blend that a guide fitted to
+/// positions leaves, and `q` may have any curvature at the vertex.
+#[derive(Clone, Debug)]
+pub(crate) struct Guide {
+    valence: usize,
+    /// `MONOMIALS × points()`, row-major.
+    coefficients: Vec<f64>,
+}
+
+/// Exponents of monomial `k`: by total degree, falling in the first.
+fn exponents() -> [(usize, usize); MONOMIALS] {
+    let mut out = [(0, 0); MONOMIALS];
+    for total in 0..=DEGREE {
+        for j in 0..=total {
+            out[jet_index(total - j, j)] = (total - j, j);
+        }
+    }
+    out
+}
+
+/// Where the `2n + 8` control points of sector `j` stand in the two-ring's order: the centre, its
+/// ring from sector 0 on, then four outer points per sector.
+pub(crate) fn two_ring_columns(n: usize, j: usize) -> Vec<usize> {
+    let outer = |sector: usize, k: usize| 2 * n + 1 + 4 * (sector % n) + k;
+    let mut columns = vec![0];
+    columns.extend((0..2 * n).map(|i| 1 + (i + 2 * j) % (2 * n)));
+    columns.push(outer(j + n - 1, 3));
+    columns.extend((0..4).map(|k| outer(j, k)));
+    columns.extend((0..2).map(|k| outer(j + 1, k)));
+    columns
+}
+
+impl Guide {
+    /// Fits the guide of valence `n`: `weights` evaluates the Catmull-Clark patch, `map` is the
+    /// characteristic map on its control points.
+    pub(crate) fn new(
+        n: usize,
+        map: &[[f64; 2]],
+        weights: impl Fn(f64, f64) -> JetWeights,
+    ) -> Self {
+        let count = 2 * n + 8;
+        let width = MONOMIALS + count;
+        let mut rows = Vec::new();
+        for cell in 0..CELLS * CELLS {
+            let corner = [cell / CELLS, cell % CELLS].map(|c| c as f64 / CELLS as f64);
+            for (x, wx) in GAUSS_6 {
+                for (y, wy) in GAUSS_6 {
+                    let u = corner[0] + x / CELLS as f64;
+                    let v = corner[1] + y / CELLS as f64;
+                    let measure = wx * wy / (CELLS * CELLS) as f64;
+                    sample_rows(&weights(u, v), map, u, v, measure, &mut rows);
+                }
+            }
+        }
+        // The other sectors see the same integrals in rotated coordinates: reduce one sector to a
+        // triangle, then stack its rotated copies.
+        householder(&mut rows, width, MONOMIALS);
+        let points = 6 * n + 1;
+        let wide = MONOMIALS + points;
+        let mut stacked = Vec::with_capacity(n * MONOMIALS * wide);
+        for j in 0..n {
+            let rotation = rotated_monomials(TAU * j as f64 / n as f64);
+            let columns = two_ring_columns(n, j);
+            for i in 0..MONOMIALS {
+                let source = &rows[i * width..(i + 1) * width];
+                let mut row = vec![0.0; wide];
+                for (k, out) in row[..MONOMIALS].iter_mut().enumerate() {
+                    let turned = &rotation[k * MONOMIALS..(k + 1) * MONOMIALS];
+                    *out = (i..MONOMIALS).map(|m| source[m] * turned[m]).sum();
+                }
+                for (&c, &value) in columns.iter().zip(&source[MONOMIALS..]) {
+                    row[MONOMIALS + c] += value;
+                }
+                stacked.extend(row);
+            }
+        }
+        householder(&mut stacked, wide, MONOMIALS);
+        let mut coefficients = vec![0.0; MONOMIALS * points];
+        for i in (0..MONOMIALS).rev() {
+            for c in 0..points {
+                let mut value = -stacked[i * wide + MONOMIALS + c];
+                for k in i + 1..MONOMIALS {
+                    value -= stacked[i * wide + k] * coefficients[k * points + c];
+                }
+                coefficients[i * points + c] = value / stacked[i * wide + i];
+            }
+        }
+        Self { valence: n, coefficients }
+    }
+
+    /// Number of control points: the vertex and its two rings.
+    pub(crate) fn points(&self) -> usize {
+        6 * self.valence + 1
+    }
+
+    /// Weights of the blended patch of sector 0 from those of the Catmull-Clark patch.
+    pub(crate) fn blend(&self, plain: &JetWeights, map: &[[f64; 2]], u: f64, v: f64) -> JetWeights {
+        let monomials = monomial_jets(&coordinate_jets(plain, map));
+        let fade = weight_jet(septic_step, u, v);
+        let columns = two_ring_columns(self.valence, 0);
+        let points = self.points();
+        let mut wide = vec![[0.0; JET_LEN]; points];
+        for (k, &c) in columns.iter().enumerate() {
+            wide[c] = plain.jet(k);
+        }
+        let mut out = JetWeights::zeros(points);
+        for (c, jet) in wide.iter().enumerate() {
+            let mut difference: Jet = jet.map(|x| -x);
+            for (k, monomial) in monomials.iter().enumerate() {
+                let coefficient = self.coefficients[k * points + c];
+                for d in 0..JET_LEN {
+                    difference[d] += coefficient * monomial[d];
+                }
+            }
+            let correction = jet_product(&fade, &difference);
+            out.set_jet(c, &std::array::from_fn(|d| jet[d] + correction[d]));
+        }
+        out
+    }
+}
+
+/// Jets of the characteristic coordinates.
+pub(crate) fn coordinate_jets(plain: &JetWeights, map: &[[f64; 2]]) -> [Jet; 2] {
+    [0, 1].map(|axis| {
+        std::array::from_fn(|d| plain.row(d).iter().zip(map).map(|(w, p)| w * p[axis]).sum())
+    })
+}
+
+fn monomial_jets(coordinates: &[Jet; 2]) -> [Jet; MONOMIALS] {
+    let mut out = [[0.0; JET_LEN]; MONOMIALS];
+    out[0][0] = 1.0;
+    for (k, (i, j)) in exponents().into_iter().enumerate().skip(1) {
+        out[k] = if i > 0 {
+            jet_product(&out[jet_index(i - 1, j)], &coordinates[0])
+        } else {
+            jet_product(&out[jet_index(0, j - 1)], &coordinates[1])
+        };
+    }
+    out
+}
+
+/// The four weighted third derivatives by `(ξ, η)` at one sample: of `w` times each monomial, then
+/// of `1 − w` times each control point's weight.
+fn sample_rows(
+    plain: &JetWeights,
+    map: &[[f64; 2]],
+    u: f64,
+    v: f64,
+    measure: f64,
+    rows: &mut Vec<f64>,
+) {
+    let coordinates = coordinate_jets(plain, map);
+    let area =
+        (coordinates[0][1] * coordinates[1][2] - coordinates[1][1] * coordinates[0][2]).abs();
+    let mut local = coordinates;
+    local[0][0] = 0.0;
+    local[1][0] = 0.0;
+    // Column k: the (u, v) jet of the k-th local monomial; solving with it turns (u, v) jets into
+    // Taylor coefficients in (ξ, η).
+    let taylor = monomial_jets(&local);
+    let mut system = [[0.0; JET_LEN]; JET_LEN];
+    for d in 0..JET_LEN {
+        for k in 0..JET_LEN {
+            system[d][k] = taylor[k][d];
+        }
+    }
+    let fade = weight_jet(septic_step, u, v);
+    let mut rest = fade.map(|x| -x);
+    rest[0] += 1.0;
+    let mut columns: Vec<Jet> =
+        monomial_jets(&coordinates).iter().map(|m| jet_product(&fade, m)).collect();
+    columns.extend((0..plain.control_points()).map(|k| jet_product(&rest, &plain.jet(k))));
+    solve_jets(&mut system, &mut columns);
+    // |∇³f|² = f_xxx² + 3 f_xxy² + 3 f_xyy² + f_yyy², with f_xxx = 6 c₃₀ and f_xxy = 2 c₂₁.
+    let factors = [6.0, 12.0_f64.sqrt(), 12.0_f64.sqrt(), 6.0];
+    for (i, factor) in factors.into_iter().enumerate() {
+        let scale = factor * (measure * area).sqrt();
+        rows.extend(columns.iter().map(|c| scale * c[6 + i]));
+    }
+}
+
+/// Solves `system · x = column` for every column, in place.
+fn solve_jets(system: &mut [[f64; JET_LEN]; JET_LEN], columns: &mut [Jet]) {
+    for k in 0..JET_LEN {
+        let mut pivot = k;
+        for i in k + 1..JET_LEN {
+            if system[i][k].abs() > system[pivot][k].abs() {
+                pivot = i;
+            }
+        }
+        system.swap(k, pivot);
+        columns.iter_mut().for_each(|c| c.swap(k, pivot));
+        for i in 0..JET_LEN {
+            if i != k && system[i][k] != 0.0 {
+                let factor = system[i][k] / system[k][k];
+                for j in k..JET_LEN {
+                    system[i][j] -= factor * system[k][j];
+                }
+                columns.iter_mut().for_each(|c| c[i] -= factor * c[k]);
+            }
+        }
+    }
+    for k in 0..JET_LEN {
+        columns.iter_mut().for_each(|c| c[k] /= system[k][k]);
+    }
+}
+
+/// Row `k`: the monomial `k` of the rotated coordinates as a combination of monomials.
+fn rotated_monomials(angle: f64) -> Vec<f64> {
+    let (s, c) = angle.sin_cos();
+    let mut out = vec![0.0; MONOMIALS * MONOMIALS];
+    out[0] = 1.0;
+    for (k, (i, j)) in exponents().into_iter().enumerate().skip(1) {
+        // ξ' = c ξ − s η, η' = s ξ + c η.
+        let (before, factors) =
+            if i > 0 { (jet_index(i - 1, j), [c, -s]) } else { (jet_index(0, j - 1), [s, c]) };
+        for (m, (p, q)) in exponents().into_iter().enumerate() {
+            let value = out[before * MONOMIALS + m];
+            if value != 0.0 {
+                out[k * MONOMIALS + jet_index(p + 1, q)] += factors[0] * value;
+                out[k * MONOMIALS + jet_index(p, q + 1)] += factors[1] * value;
+            }
+        }
+    }
+    out
+}
+
+/// Householder QR of the first `pivots` columns of a row-major matrix, applied to all of them; the
+/// triangle ends up in the first rows.
+fn householder(matrix: &mut [f64], width: usize, pivots: usize) {
+    let rows = matrix.len() / width;
+    let mut reflector = vec![0.0; rows];
+    let mut products = vec![0.0; width];
+    for k in 0..pivots {
+        let mut norm = 0.0;
+        for i in k..rows {
+            reflector[i] = matrix[i * width + k];
+            norm += reflector[i] * reflector[i];
+        }
+        let alpha = -reflector[k].signum() * norm.sqrt();
+        reflector[k] -= alpha;
+        let length = norm - matrix[k * width + k].powi(2) + reflector[k].powi(2);
+        if length == 0.0 {
+            continue;
+        }
+        products[k..].fill(0.0);
+        for i in k..rows {
+            let row = &matrix[i * width..(i + 1) * width];
+            for j in k..width {
+                products[j] += reflector[i] * row[j];
+            }
+        }
+        for i in k..rows {
+            let factor = 2.0 * reflector[i] / length;
+            let row = &mut matrix[i * width..(i + 1) * width];
+            for j in k..width {
+                row[j] -= factor * products[j];
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn rotated_monomials_agree_with_rotated_points() {
+        let angle = 0.7_f64;
+        let (s, c) = angle.sin_cos();
+        let (x, y) = (0.3, -0.8);
+        let (rx, ry) = (c * x - s * y, s * x + c * y);
+        let value = |x: f64, y: f64| exponents().map(|(i, j)| x.powi(i as i32) * y.powi(j as i32));
+        let matrix = rotated_monomials(angle);
+        let (plain, rotated) = (value(x, y), value(rx, ry));
+        for k in 0..MONOMIALS {
+            let sum: f64 = (0..MONOMIALS).map(|m| matrix[k * MONOMIALS + m] * plain[m]).sum();
+            assert!((sum - rotated[k]).abs() < 1e-14, "monomial {k}");
+        }
+    }
+}

@@ -1,0 +1,475 @@
+//! A subdivision surface: patches, shared bases, evaluation.
+
+use crate::blend::{Blend, flat_step, weight_jet};
+use crate::characteristic::{characteristic_map, limit_masks};
+use crate::classes::Classes;
+use crate::crease::{Creases, Tags};
+use crate::guide::{Guide, coordinate_jets};
+use crate::jet::{JET_LEN, Jet, JetWeights, SurfaceJet, jet_product};
+use crate::local::LocalPatch;
+use geom_core::{DVec3, FaceId, HalfEdgeId, PolyMesh, VertexId};
+use std::collections::HashMap;
+
+/// Why a control mesh cannot be evaluated.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+#[expect(missing_docs, reason = "the messages spell out every field")]
+pub enum SubdivisionError {
+    /// A face that is not a quad.
+    #[error("face {face} has {corners} corners; refine the mesh once to turn all faces into quads")]
+    NotQuad { face: usize, corners: usize },
+    /// An extraordinary vertex whose ring is not regular.
+    #[error(
+        "extraordinary vertex {vertex} has vertex {neighbour}, which is not regular, in its ring; refine the mesh once more"
+    )]
+    Crowded { vertex: usize, neighbour: usize },
+    /// A vertex with two edges inside the surface.
+    #[error("interior vertex {vertex} has only 2 edges; merge its two faces")]
+    ValenceTwo { vertex: usize },
+    /// The mesh around a face overlaps itself.
+    #[error("the faces around face {face} overlap one another; refine the mesh once more")]
+    Overlapping { face: usize },
+}
+
+/// Patches with the same [`BasisId`] have the same weights on their control points.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub struct BasisId(pub usize);
+
+#[derive(Clone, Debug)]
+enum Basis {
+    Plain { class: usize },
+    Guided { class: usize, map: Vec<[f64; 2]>, guide: Guide },
+    Flat { class: usize, map: Vec<[f64; 2]>, valence: usize },
+}
+
+/// One quad's piece of the limit surface, over the unit square.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Patch {
+    /// The quad.
+    pub face: FaceId,
+    /// The half-edge from the corner at `(0, 0)` to the one at `(1, 0)`.
+    pub corner: HalfEdgeId,
+    /// Which weights it uses.
+    pub basis: BasisId,
+    /// Vertices the weights apply to.
+    pub controls: Vec<u32>,
+}
+
+/// A Catmull-Clark limit surface with exact evaluation (Stam 1998, by powers of the subdivision
+/// matrix), repaired around extraordinary vertices as its [`Blend`] says.
+///
+/// Everything is linear in the control points: a patch's jets are its basis' weights times its
+/// control points, and patches of one connectivity share their basis, which depends on the
+/// valence alone. The surface holds connectivity only; positions are passed to each evaluation.
+#[derive(Clone, Debug)]
+pub struct SubdivisionSurface {
+    classes: Classes,
+    bases: Vec<Basis>,
+    patches: Vec<Patch>,
+    regular: Option<BasisId>,
+    blend: Blend,
+}
+
+impl SubdivisionSurface {
+    /// Finds the patches of a quad mesh.
+    ///
+    /// Interior extraordinary vertices that no crease touches are blended and need a regular ring,
+    /// which one refinement of any quad mesh gives (see [`crate::refine`]).
+    ///
+    /// # Errors
+    /// [`SubdivisionError`] names the first face or vertex at fault.
+    pub fn new(mesh: &PolyMesh, creases: &Creases, blend: Blend) -> Result<Self, SubdivisionError> {
+        for f in mesh.faces() {
+            if mesh.face_degree(f) != 4 {
+                let corners = mesh.face_degree(f);
+                return Err(SubdivisionError::NotQuad { face: f.index(), corners });
+            }
+        }
+        let tags = Tags::new(mesh, creases);
+        let mut builder = Builder {
+            mesh,
+            tags: &tags,
+            plain: plain_vertices(mesh, &tags),
+            surface: Self {
+                classes: Classes::default(),
+                bases: Vec::new(),
+                patches: Vec::with_capacity(mesh.face_count()),
+                regular: None,
+                blend,
+            },
+            interior: HashMap::new(),
+            by_class: HashMap::new(),
+        };
+        let blended = builder.blended_vertices()?;
+        for f in mesh.faces() {
+            builder.add_patch(f, &blended)?;
+        }
+        Ok(builder.surface)
+    }
+
+    /// All patches, in the order of the faces.
+    #[must_use]
+    pub fn patches(&self) -> &[Patch] {
+        &self.patches
+    }
+
+    /// Number of different bases.
+    #[must_use]
+    pub fn basis_count(&self) -> usize {
+        self.bases.len()
+    }
+
+    /// The basis of patches inside a regular grid: bi-cubic B-splines on 16 control points, see
+    /// [`Self::b_spline_grid`] for their order.
+    #[must_use]
+    pub fn regular_basis(&self) -> Option<BasisId> {
+        self.regular
+    }
+
+    /// How extraordinary vertices are repaired.
+    #[must_use]
+    pub fn blend(&self) -> Blend {
+        self.blend
+    }
+
+    /// Whether the patches of a basis touch a blended extraordinary vertex (at `(0, 0)`).
+    #[must_use]
+    pub fn is_blended(&self, basis: BasisId) -> bool {
+        !matches!(self.bases[basis.0], Basis::Plain { .. })
+    }
+
+    /// For a bi-cubic B-spline patch the control points as combinations `(position in the patch's
+    /// controls, weight)`; entry `4 i + j` stands at `(i − 1, j − 1)` around the unit square.
+    #[must_use]
+    pub fn b_spline_grid(&self, basis: BasisId) -> Option<&[Vec<(usize, f64)>; 16]> {
+        match &self.bases[basis.0] {
+            Basis::Plain { class } => self.classes.grid(*class),
+            _ => None,
+        }
+    }
+
+    /// Jets of the control points' weights at `(u, v)` in the unit square.
+    ///
+    /// At an extraordinary corner that is not blended the derivatives are those at a point `2⁻⁴⁸`
+    /// away from it: the true ones do not exist.
+    #[must_use]
+    pub fn weights(&self, basis: BasisId, u: f64, v: f64) -> JetWeights {
+        match &self.bases[basis.0] {
+            Basis::Plain { class } => self.classes.weights(*class, u, v),
+            Basis::Guided { class, map, guide } => {
+                guide.blend(&self.classes.weights(*class, u, v), map, u, v)
+            }
+            Basis::Flat { class, map, valence } => {
+                flat_weights(&self.classes.weights(*class, u, v), map, *valence, u, v)
+            }
+        }
+    }
+
+    /// Position and derivatives of a patch at `(u, v)`.
+    ///
+    /// # Panics
+    /// If `positions` is shorter than the mesh's vertices.
+    #[must_use]
+    pub fn evaluate(&self, positions: &[DVec3], patch: &Patch, u: f64, v: f64) -> SurfaceJet {
+        self.weights(patch.basis, u, v).apply(|k| positions[patch.controls[k] as usize])
+    }
+
+    /// Control points of a patch as a bi-cubic Bezier patch, `points[i][j]` for the `i`-th column
+    /// in `u`; `None` if the patch is not a B-spline patch.
+    #[must_use]
+    pub fn bezier(&self, positions: &[DVec3], patch: &Patch) -> Option<[[DVec3; 4]; 4]> {
+        // Rows: Bezier points from uniform B-spline points, times six.
+        const CHANGE: [[f64; 4]; 4] = [
+            [1.0, 4.0, 1.0, 0.0],
+            [0.0, 4.0, 2.0, 0.0],
+            [0.0, 2.0, 4.0, 0.0],
+            [0.0, 1.0, 4.0, 1.0],
+        ];
+        let grid = self.b_spline_grid(patch.basis)?;
+        let at = |i: usize, j: usize| -> DVec3 {
+            grid[4 * i + j].iter().map(|&(k, w)| w * positions[patch.controls[k] as usize]).sum()
+        };
+        let mut out = [[DVec3::ZERO; 4]; 4];
+        for (i, row) in out.iter_mut().enumerate() {
+            for (j, point) in row.iter_mut().enumerate() {
+                for p in 0..4 {
+                    for q in 0..4 {
+                        *point += CHANGE[i][p] * CHANGE[j][q] / 36.0 * at(p, q);
+                    }
+                }
+            }
+        }
+        Some(out)
+    }
+}
+
+/// Number of refinements after which all faces are quads and every blended vertex has a regular
+/// ring: 0 if `mesh` can be used as it is.
+#[must_use]
+pub fn refinements_needed(mesh: &PolyMesh, creases: &Creases) -> usize {
+    let quads = mesh.is_quad_mesh();
+    if quads && SubdivisionSurface::new(mesh, creases, Blend::Flat).is_ok() {
+        0
+    } else if quads {
+        1
+    } else {
+        // The centre of an n-gon is extraordinary and may share a quad with an old vertex.
+        let crowded = mesh.faces().any(|f| {
+            mesh.face_degree(f) != 4 && mesh.face_vertices(f).any(|v| mesh.valence(v) != 4)
+        });
+        1 + usize::from(crowded)
+    }
+}
+
+// Interior vertices of any valence that no crease touches, among quads only.
+fn plain_vertices(mesh: &PolyMesh, tags: &Tags) -> Vec<bool> {
+    mesh.vertices()
+        .map(|v| {
+            mesh.outgoing(v).is_some()
+                && !mesh.is_boundary_vertex(v)
+                && !tags.corner[v.index()]
+                && mesh.outgoing_half_edges(v).all(|h| {
+                    tags.sharpness[h.index()] == 0.0
+                        && tags.shift[h.index()] == 0.0
+                        && tags.shift[mesh.twin(h).index()] == 0.0
+                })
+        })
+        .collect()
+}
+
+struct Builder<'a> {
+    mesh: &'a PolyMesh,
+    tags: &'a Tags,
+    plain: Vec<bool>,
+    surface: SubdivisionSurface,
+    // Bases of patches without crease or boundary, by (valence of the first corner, blended).
+    interior: HashMap<(usize, bool), BasisId>,
+    by_class: HashMap<usize, BasisId>,
+}
+
+impl Builder<'_> {
+    fn is_regular(&self, v: VertexId) -> bool {
+        self.plain[v.index()] && self.mesh.valence(v) == 4
+    }
+
+    /// Marks the extraordinary vertices to be blended.
+    fn blended_vertices(&self) -> Result<Vec<bool>, SubdivisionError> {
+        let mut blended = vec![false; self.mesh.vertex_count()];
+        for v in self.mesh.vertices() {
+            if !self.plain[v.index()] || self.mesh.valence(v) == 4 {
+                continue;
+            }
+            if self.mesh.valence(v) == 2 {
+                return Err(SubdivisionError::ValenceTwo { vertex: v.index() });
+            }
+            if self.surface.blend == Blend::None {
+                continue;
+            }
+            for h in self.mesh.outgoing_half_edges(v) {
+                let mut at = h;
+                for _ in 0..2 {
+                    at = self.mesh.next(at);
+                    let neighbour = self.mesh.origin(at);
+                    if !self.is_regular(neighbour) {
+                        return Err(SubdivisionError::Crowded {
+                            vertex: v.index(),
+                            neighbour: neighbour.index(),
+                        });
+                    }
+                }
+            }
+            blended[v.index()] = true;
+        }
+        Ok(blended)
+    }
+
+    fn add_patch(&mut self, face: FaceId, blended: &[bool]) -> Result<(), SubdivisionError> {
+        let mesh = self.mesh;
+        let first = mesh.face_half_edge(face);
+        let sides: Vec<HalfEdgeId> = mesh.face_half_edges(face).collect();
+        let odd: Vec<HalfEdgeId> =
+            sides.iter().copied().filter(|&h| !self.is_regular(mesh.origin(h))).collect();
+        let patch = match odd[..] {
+            [] => self.interior_patch(face, first, false)?,
+            [h] if self.plain[mesh.origin(h).index()] => {
+                self.interior_patch(face, h, blended[mesh.origin(h).index()])?
+            }
+            _ => self.general_patch(face, &sides)?,
+        };
+        self.surface.patches.push(patch);
+        Ok(())
+    }
+
+    /// A patch whose corners are regular, except perhaps the one `corner` leaves.
+    fn interior_patch(
+        &mut self,
+        face: FaceId,
+        corner: HalfEdgeId,
+        blended: bool,
+    ) -> Result<Patch, SubdivisionError> {
+        let mesh = self.mesh;
+        let n = mesh.valence(mesh.origin(corner));
+        let basis = if let Some(&id) = self.interior.get(&(n, blended)) {
+            id
+        } else {
+            let id = self.interior_basis(face, corner, n, blended)?;
+            self.interior.insert((n, blended), id);
+            if n == 4 {
+                self.surface.regular = Some(id);
+            }
+            id
+        };
+        let controls = if blended && self.surface.blend == Blend::Smooth {
+            self.two_ring(corner, n)
+        } else {
+            self.one_ring(corner, n)
+        };
+        Ok(Patch { face, corner, basis, controls })
+    }
+
+    fn interior_basis(
+        &mut self,
+        face: FaceId,
+        corner: HalfEdgeId,
+        n: usize,
+        blended: bool,
+    ) -> Result<BasisId, SubdivisionError> {
+        let overlapping = SubdivisionError::Overlapping { face: face.index() };
+        let (local, _) =
+            LocalPatch::cut(self.mesh, self.tags, corner).ok_or(overlapping.clone())?;
+        let class = self.surface.classes.insert(&local).ok_or(overlapping.clone())?;
+        let classes = &self.surface.classes;
+        if classes.vertex_count(class) != 2 * n + 8 {
+            return Err(overlapping);
+        }
+        let basis = if blended {
+            let matrix = classes.subdivision_matrix(class).ok_or(overlapping)?;
+            let map = characteristic_map(n, matrix);
+            if self.surface.blend == Blend::Smooth {
+                let guide = Guide::new(n, &map, |u, v| classes.weights(class, u, v));
+                Basis::Guided { class, map, guide }
+            } else {
+                Basis::Flat { class, map, valence: n }
+            }
+        } else {
+            Basis::Plain { class }
+        };
+        Ok(self.push_basis(basis))
+    }
+
+    fn push_basis(&mut self, basis: Basis) -> BasisId {
+        self.surface.bases.push(basis);
+        BasisId(self.surface.bases.len() - 1)
+    }
+
+    /// A patch at the boundary, at a crease, or with several extraordinary corners that are not
+    /// blended: turned so that as few classes as possible arise.
+    fn general_patch(
+        &mut self,
+        face: FaceId,
+        sides: &[HalfEdgeId],
+    ) -> Result<Patch, SubdivisionError> {
+        let overlapping = SubdivisionError::Overlapping { face: face.index() };
+        let mut best: Option<(Vec<u64>, HalfEdgeId, LocalPatch, Vec<HalfEdgeId>)> = None;
+        for &corner in sides {
+            let (local, sources) =
+                LocalPatch::cut(self.mesh, self.tags, corner).ok_or(overlapping.clone())?;
+            let key = local.key();
+            if best.as_ref().is_none_or(|(other, ..)| key < *other) {
+                best = Some((key, corner, local, sources));
+            }
+        }
+        let (_, corner, local, sources) = best.ok_or(overlapping.clone())?;
+        let class = self.surface.classes.insert(&local).ok_or(overlapping)?;
+        let basis = if let Some(&id) = self.by_class.get(&class) {
+            id
+        } else {
+            let id = self.push_basis(Basis::Plain { class });
+            self.by_class.insert(class, id);
+            id
+        };
+        let controls = sources.iter().map(|&h| self.mesh.origin(h).0).collect();
+        Ok(Patch { face, corner, basis, controls })
+    }
+
+    /// The `2n + 8` control points of an interior patch, in the order of [`LocalPatch`].
+    fn one_ring(&self, corner: HalfEdgeId, n: usize) -> Vec<u32> {
+        let mesh = self.mesh;
+        let mut out = Vec::with_capacity(2 * n + 8);
+        out.push(mesh.origin(corner).0);
+        let mut at = corner;
+        for _ in 0..n {
+            out.push(mesh.target(at).0);
+            out.push(mesh.target(mesh.next(at)).0);
+            at = mesh.twin(mesh.prev(at));
+        }
+        self.push_outer(corner, &mut out);
+        out
+    }
+
+    // The seven points around the far corners: two faces around corner 1, the one opposite of
+    // corner 2, two around corner 3.
+    fn push_outer(&self, corner: HalfEdgeId, out: &mut Vec<u32>) {
+        let mesh = self.mesh;
+        let target = |h: HalfEdgeId| mesh.target(h).0;
+        // Across the edge from corner 1 to corner 2: c2 → c1 → p → q.
+        let east = mesh.next(mesh.twin(mesh.next(corner)));
+        let north = mesh.next(mesh.twin(mesh.next(mesh.next(corner))));
+        // Around corner 1, below the edge to p.
+        let south_east = mesh.twin(east);
+        out.push(mesh.origin(mesh.prev(south_east)).0);
+        out.push(target(east));
+        out.push(target(mesh.next(east)));
+        // c3 → c2 → p2 → q2; the diagonal face lies between c2 → q and c2 → p2.
+        let diagonal = mesh.twin(north);
+        out.push(mesh.origin(mesh.prev(diagonal)).0);
+        out.push(target(north));
+        out.push(target(mesh.next(north)));
+        // Around corner 3, left of the edge to q2.
+        let west = mesh.twin(mesh.next(mesh.next(north)));
+        out.push(target(mesh.next(west)));
+    }
+
+    /// The `6n + 1` control points of a blended patch: the one-ring, then points 1 to 4 of the
+    /// outer ones of every sector.
+    fn two_ring(&self, corner: HalfEdgeId, n: usize) -> Vec<u32> {
+        let mesh = self.mesh;
+        let mut out = self.one_ring(corner, n);
+        out.truncate(2 * n + 1);
+        let mut at = corner;
+        let mut outer = Vec::with_capacity(7);
+        for _ in 0..n {
+            outer.clear();
+            self.push_outer(at, &mut outer);
+            out.extend_from_slice(&outer[1..5]);
+            at = mesh.twin(mesh.prev(at));
+        }
+        out
+    }
+}
+
+/// Weights of the surface with the flat spot of Joshi 2008, Eq. 5.3, the tangent plane being
+/// parametrised by the characteristic coordinates so that it stays linear in the control points.
+fn flat_weights(plain: &JetWeights, map: &[[f64; 2]], n: usize, u: f64, v: f64) -> JetWeights {
+    let fade = weight_jet(flat_step, u, v);
+    if fade.iter().all(|&w| w == 0.0) {
+        return plain.clone();
+    }
+    let masks = limit_masks(n);
+    let coordinates = coordinate_jets(plain, map);
+    let mut out = plain.clone();
+    for k in 0..plain.control_points() {
+        let jet = plain.jet(k);
+        let mut difference: Jet = jet.map(|x| -x);
+        if k < masks.position.len() {
+            difference[0] += masks.position[k];
+            for d in 0..JET_LEN {
+                difference[d] += masks.tangents[0][k] * coordinates[0][d]
+                    + masks.tangents[1][k] * coordinates[1][d];
+            }
+        }
+        let correction = jet_product(&fade, &difference);
+        out.set_jet(k, &std::array::from_fn(|d| jet[d] + correction[d]));
+    }
+    out
+}
