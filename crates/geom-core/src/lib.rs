@@ -11,6 +11,7 @@ mod isolines;
 mod jet;
 mod least_squares;
 mod poly_mesh;
+mod third_order;
 mod tri_mesh;
 
 pub use bounding_box::BoundingBox;
@@ -26,4 +27,5 @@ pub use isolines::{Isoline, isolines};
 pub use jet::SurfaceJet;
 pub use least_squares::{RANK_RATIO, RankError, least_squares};
 pub use poly_mesh::{FaceId, HalfEdgeId, MeshError, PolyMesh, VertexId};
+pub use third_order::{ThirdOrder, UmbilicKind};
 pub use tri_mesh::{ClosestPoint, Foot, Nearest, TriMesh, closest_barycentric, closest_on_segment};

@@ -1,6 +1,6 @@
 //! Jets: a value and its parameter derivatives up to order three.
 
-use geom_core::DVec3;
+use geom_core::{DVec3, SurfaceJet};
 
 /// Number of derivatives in a jet.
 pub const JET_LEN: usize = 10;
@@ -12,9 +12,6 @@ pub const JET_ORDERS: [(usize, usize); JET_LEN] =
 
 /// A scalar function's value and derivatives at one parameter pair, in the order of [`JET_ORDERS`].
 pub type Jet = [f64; JET_LEN];
-
-/// A surface's position and derivatives at one parameter pair, in the order of [`JET_ORDERS`].
-pub type SurfaceJet = [DVec3; JET_LEN];
 
 /// Position of the derivative `(i, j)` in a jet.
 pub(crate) const fn jet_index(i: usize, j: usize) -> usize {
@@ -137,16 +134,16 @@ impl JetWeights {
         }
     }
 
-    /// Applies the weights to control points.
+    /// Applies the weights to control points; the fourth derivatives of the jet stay zero.
     ///
     /// # Panics
     /// If `controls` yields fewer points than there are weights.
     #[must_use]
     pub fn apply(&self, controls: impl Fn(usize) -> DVec3) -> SurfaceJet {
-        let mut out = [DVec3::ZERO; JET_LEN];
+        let mut out = SurfaceJet::default();
         for k in 0..self.count {
             let p = controls(k);
-            for (d, value) in out.iter_mut().enumerate() {
+            for (d, value) in out.derivatives[..JET_LEN].iter_mut().enumerate() {
                 *value += self.values[d * self.count + k] * p;
             }
         }

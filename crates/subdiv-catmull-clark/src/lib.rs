@@ -20,7 +20,7 @@
 //! let fine = refine(&cube, &Creases::none())?;
 //! let surface = SubdivisionSurface::new(&fine.mesh, &fine.creases, Blend::Smooth)?;
 //! let jet = surface.evaluate(fine.mesh.positions(), &surface.patches()[0], 0.5, 0.5);
-//! assert!(jet[1].cross(jet[2]).dot(jet[0]) > 0.0); // the normal points outwards
+//! assert!(jet.d(1, 0).cross(jet.d(0, 1)).dot(jet.position()) > 0.0); // the normal points outwards
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
@@ -38,7 +38,7 @@ mod surface;
 pub use blend::{Blend, flat_step, septic_step};
 pub use characteristic::{LimitMasks, limit_masks, subdominant_eigenvalue};
 pub use crease::{Creases, INFINITE_SHARPNESS};
-pub use jet::{JET_LEN, JET_ORDERS, Jet, JetWeights, SurfaceJet, cubic_basis, jet_product};
+pub use jet::{JET_LEN, JET_ORDERS, Jet, JetWeights, cubic_basis, jet_product};
 pub use limit::{LimitFrame, limit_frames};
 pub use refine::{Refined, Stencils, refine};
 pub use surface::{BasisId, Patch, SubdivisionError, SubdivisionSurface, refinements_needed};

@@ -5,9 +5,9 @@ use crate::characteristic::{characteristic_map, limit_masks};
 use crate::classes::Classes;
 use crate::crease::{Creases, Tags};
 use crate::guide::{Guide, coordinate_jets};
-use crate::jet::{JET_LEN, Jet, JetWeights, SurfaceJet, jet_product};
+use crate::jet::{JET_LEN, Jet, JetWeights, jet_product};
 use crate::local::LocalPatch;
-use geom_core::{DVec3, FaceId, HalfEdgeId, PolyMesh, VertexId};
+use geom_core::{DVec3, FaceId, HalfEdgeId, PolyMesh, SurfaceJet, VertexId};
 use std::collections::HashMap;
 
 /// Why a control mesh cannot be evaluated.

@@ -15,7 +15,7 @@ fn grid(n: u32, lift: impl Fn(f64, f64) -> f64) -> PolyMesh {
     let faces: Vec<[u32; 4]> = (0..n)
         .flat_map(|i| (0..n).map(move |j| [at(i, j), at(i + 1, j), at(i + 1, j + 1), at(i, j + 1)]))
         .collect();
-    PolyMesh::new(positions, &faces).unwrap()
+    PolyMesh::new(positions, &faces).expect("a manifold")
 }
 
 /// A disc of `n` sectors of `m × m` quads around one vertex of valence `n`.
@@ -59,17 +59,22 @@ fn star(n: u32, m: u32) -> PolyMesh {
             }
         }
     }
-    PolyMesh::new(positions, &faces).unwrap()
+    PolyMesh::new(positions, &faces).expect("a manifold")
 }
 
 fn patch_at(mesh: &PolyMesh, surface: &SubdivisionSurface, v: u32) -> Patch {
-    surface.patches().iter().find(|p| mesh.origin(p.corner) == VertexId(v)).unwrap().clone()
+    surface
+        .patches()
+        .iter()
+        .find(|p| mesh.origin(p.corner) == VertexId(v))
+        .expect("a patch at the vertex")
+        .clone()
 }
 
 fn check_by_differences(mesh: &PolyMesh, surface: &SubdivisionSurface, patch: &Patch, tol: f64) {
     let h = 1e-4;
     for (u, v) in [(0.31, 0.17), (0.62, 0.83), (0.11, 0.57), (0.77, 0.29)] {
-        let at = |u, v| surface.evaluate(mesh.positions(), patch, u, v);
+        let at = |u, v| surface.evaluate(mesh.positions(), patch, u, v).derivatives;
         let jet = at(u, v);
         let (du, dv) = ((at(u + h, v), at(u - h, v)), (at(u, v + h), at(u, v - h)));
         for (k, &(i, j)) in JET_ORDERS.iter().enumerate() {
@@ -77,7 +82,7 @@ fn check_by_differences(mesh: &PolyMesh, surface: &SubdivisionSurface, patch: &P
                 continue;
             }
             let (from, pair) = if i > 0 { ((i - 1, j), &du) } else { ((i, j - 1), &dv) };
-            let at = JET_ORDERS.iter().position(|&o| o == from).unwrap();
+            let at = JET_ORDERS.iter().position(|&o| o == from).expect("a lower order");
             let want = (pair.0[at] - pair.1[at]) / (2.0 * h);
             let got = jet[k];
             assert!(
@@ -94,7 +99,7 @@ fn regular_patch_is_the_b_spline() {
     let mesh = grid(5, |x, _| x * x);
     let surface = SubdivisionSurface::new(&mesh, &Creases::none(), Blend::Smooth).unwrap();
     let patch = &surface.patches()[12];
-    let jet = surface.evaluate(mesh.positions(), patch, 0.25, 0.5);
+    let jet = surface.evaluate(mesh.positions(), patch, 0.25, 0.5).derivatives;
     assert!((jet[0] - DVec3::new(2.25, 2.5, 2.25 * 2.25 + 1.0 / 3.0)).length() < 1e-14);
     assert!((jet[1] - DVec3::new(1.0, 0.0, 4.5)).length() < 1e-13);
     assert!((jet[3] - DVec3::new(0.0, 0.0, 2.0)).length() < 1e-13);
@@ -121,10 +126,10 @@ fn every_valence_matches_differences_and_refinement() {
         let finer = SubdivisionSurface::new(&fine.mesh, &fine.creases, Blend::None).unwrap();
         let (a, b) = (patch_at(&mesh, &surface, 0), patch_at(&fine.mesh, &finer, 0));
         for (u, v) in [(0.3, 0.9), (0.01, 0.02), (0.5, 0.5)] {
-            let coarse = surface.evaluate(mesh.positions(), &a, 0.5 * u, 0.5 * v)[0];
-            let fine = finer.evaluate(fine.mesh.positions(), &b, u, v)[0];
+            let coarse = surface.evaluate(mesh.positions(), &a, 0.5 * u, 0.5 * v).derivatives[0];
+            let fine = finer.evaluate(fine.mesh.positions(), &b, u, v).position();
             // The first sector may be a different one; compare distances to the limit point.
-            let limit = surface.evaluate(mesh.positions(), &a, 0.0, 0.0)[0];
+            let limit = surface.evaluate(mesh.positions(), &a, 0.0, 0.0).derivatives[0];
             assert!(coarse.distance(limit).is_finite() && fine.is_finite());
             assert!(coarse.distance(fine) < 1e-12, "valence {n}: {coarse} against {fine}");
         }
@@ -143,12 +148,12 @@ fn blended_surface_is_twice_continuous_across_sectors() {
             let next = around.iter().find(|p| p.corner == next_corner).unwrap();
             for t in [0.05, 0.4, 0.9] {
                 // The edge u = 0 of one patch is the edge v = 0 of the next one.
-                let a = surface.evaluate(mesh.positions(), patch, 0.0, t);
-                let b = surface.evaluate(mesh.positions(), next, t, 0.0);
+                let a = surface.evaluate(mesh.positions(), patch, 0.0, t).derivatives;
+                let b = surface.evaluate(mesh.positions(), next, t, 0.0).derivatives;
                 assert!(a[0].distance(b[0]) < 1e-12);
                 let normal = a[1].cross(a[2]).normalize();
                 assert!(normal.distance(b[1].cross(b[2]).normalize()) < 1e-10);
-                let shape = |j: &[DVec3; 10]| {
+                let shape = |j: &[DVec3; 15]| {
                     let (e, f, g) = (j[1].dot(j[1]), j[1].dot(j[2]), j[2].dot(j[2]));
                     let (l, m, q) = (j[3].dot(normal), j[4].dot(normal), j[5].dot(normal));
                     let d = e * g - f * f;
@@ -166,7 +171,7 @@ fn flat_spot_has_no_curvature_at_the_vertex() {
     let mesh = star(6, 4);
     let surface = SubdivisionSurface::new(&mesh, &Creases::none(), Blend::Flat).unwrap();
     let patch = patch_at(&mesh, &surface, 0);
-    let jet = surface.evaluate(mesh.positions(), &patch, 2e-3, 2e-3);
+    let jet = surface.evaluate(mesh.positions(), &patch, 2e-3, 2e-3).derivatives;
     let normal = jet[1].cross(jet[2]).normalize();
     assert!(jet[3].dot(normal).abs() < 1e-9 && jet[5].dot(normal).abs() < 1e-9);
 }
@@ -243,8 +248,8 @@ fn infinite_crease_splits_the_surface_like_a_boundary() {
                 (f(u, v) + f(1.0 - v, u) + f(1.0 - u, 1.0 - v) + f(v, 1.0 - u)) / 4.0
             };
             (
-                mean(&|u, v| surface.evaluate(mesh.positions(), a, u, v)[0]),
-                mean(&|u, v| cut.evaluate(half.positions(), b, u, v)[0]),
+                mean(&|u, v| surface.evaluate(mesh.positions(), a, u, v).derivatives[0]),
+                mean(&|u, v| cut.evaluate(half.positions(), b, u, v).derivatives[0]),
             )
         });
         for (p, q) in points {
@@ -303,6 +308,8 @@ fn bezier_patches_reproduce_the_surface() {
                 sum += b(u)[i] * b(v)[j] * points[i][j];
             }
         }
-        assert!(sum.distance(surface.evaluate(mesh.positions(), patch, u, v)[0]) < 1e-13);
+        assert!(
+            sum.distance(surface.evaluate(mesh.positions(), patch, u, v).derivatives[0]) < 1e-13
+        );
     }
 }
