@@ -263,7 +263,8 @@ impl<'a> System<'a> {
         for i in 0..self.plan.size() {
             let a = self.matrix[self.factor.diagonal_slot(i)];
             let size = self.problem.scale[self.plan.variable[i]];
-            self.diagonal[i] = if a > 0.0 { a } else { 1.0 / (size * size) };
+            // Exact Hessians of energies can have negative diagonals.
+            self.diagonal[i] = if a != 0.0 { a.abs() } else { 1.0 / (size * size) };
         }
     }
 

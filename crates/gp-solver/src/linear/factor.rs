@@ -20,7 +20,7 @@ const SMALL: usize = 64;
 /// A factorisation that fits the structure.
 pub(crate) enum Factor {
     Band(BandCholesky),
-    Sparse { cholesky: SparseCholesky, shifted: Vec<f64> },
+    Sparse { cholesky: Box<SparseCholesky>, shifted: Vec<f64> },
 }
 
 /// Where the values of the normal matrix stand.
@@ -65,7 +65,7 @@ impl Factor {
         if wanted == Factorization::Band {
             return Ok((Self::Band(BandCholesky::new(size, band.0)), band.1));
         }
-        let cholesky = SparseCholesky::new(pattern)?;
+        let cholesky = Box::new(SparseCholesky::new(pattern)?);
         let sparse_seconds =
             cholesky.flops() / SPARSE_SPEED + cholesky.factor_len() as f64 * SPARSE_OVERHEAD;
         if wanted != Factorization::Sparse && seconds(band.0) < sparse_seconds {

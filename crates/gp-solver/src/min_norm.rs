@@ -1,0 +1,207 @@
+//! Shortest steps onto constraints.
+
+use crate::error::SolverError;
+use crate::linear::{SparseCholesky, SymmetricPattern};
+use crate::problem::{Quantity, ResidualBlock};
+use crate::report::Status;
+
+/// Settings of [`MinNormProjection::project`].
+#[derive(Clone, Debug, PartialEq)]
+pub struct ProjectionOptions {
+    /// Added to the diagonal of `J S Sᵀ Jᵀ`, as a fraction of its largest entry; keeps redundant
+    /// constraints solvable.
+    pub shift: f64,
+    /// Converged if `max |C| ≤ tolerance`.
+    pub tolerance: f64,
+    /// [`IterationLimit`](Status::IterationLimit) once the number of steps `≥ max_iterations`.
+    pub max_iterations: usize,
+}
+
+impl Default for ProjectionOptions {
+    fn default() -> Self {
+        Self { shift: 1e-12, tolerance: 1e-12, max_iterations: 20 }
+    }
+}
+
+/// What a projection did.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ProjectionReport {
+    /// How it ended; [`Stalled`](Status::Stalled) if the constraints stopped shrinking.
+    pub status: Status,
+    /// Steps taken.
+    pub iterations: usize,
+    /// `max |C|` at the start.
+    pub initial_violation: f64,
+    /// `max |C|` of the result.
+    pub final_violation: f64,
+}
+
+/// Newton's method for `C(z) = 0` with steps of least `|S⁻¹ s|`:
+/// `z ← z − S Sᵀ Jᵀ (J S Sᵀ Jᵀ + shift I)⁻¹ C`, with the pattern of the matrix analysed once.
+///
+/// Made to polish a solution: constraints that least squares left at 10⁻⁶ go to rounding level,
+/// and the unknowns move no farther than they must.
+pub struct MinNormProjection {
+    unknowns: usize,
+    cholesky: SparseCholesky,
+    /// For each unknown its (row, place in the Jacobian values), in the order of rows.
+    entries: Vec<(usize, usize)>,
+    starts: Vec<usize>,
+    /// Where the products of the pairs of each unknown's entries go.
+    targets: Vec<usize>,
+}
+
+impl MinNormProjection {
+    /// Plans the projection onto the zero set of `constraints` in a space of `unknowns` unknowns.
+    ///
+    /// # Errors
+    /// [`SolverError::ColumnOutOfRange`] or out of memory.
+    pub fn new(constraints: &dyn ResidualBlock, unknowns: usize) -> Result<Self, SolverError> {
+        let elements = constraints.elements();
+        let mut lists = vec![Vec::new(); unknowns];
+        for e in 0..elements.len() {
+            let columns = elements.columns(e);
+            if let Some(&column) = columns.iter().find(|&&c| c >= unknowns) {
+                let block = constraints.name().to_owned();
+                return Err(SolverError::ColumnOutOfRange { block, element: e, column, unknowns });
+            }
+            let begin = elements.jacobian_range(e).start;
+            for (r, row) in elements.rows(e).enumerate() {
+                for (k, &column) in columns.iter().enumerate() {
+                    lists[column].push((row, begin + r * columns.len() + k));
+                }
+            }
+        }
+        let pairs = lists.iter().flat_map(|list| {
+            list.iter()
+                .enumerate()
+                .flat_map(move |(k, &(i, _))| list[..=k].iter().map(move |&(j, _)| (i, j)))
+        });
+        let pattern = SymmetricPattern::new(elements.rows_total(), pairs.clone())?;
+        let targets =
+            pairs.map(|(i, j)| pattern.slot(i, j).expect("the pattern has every pair")).collect();
+        let mut starts = vec![0];
+        for list in &lists {
+            starts.push(starts[starts.len() - 1] + list.len());
+        }
+        let cholesky = SparseCholesky::new(pattern)?;
+        Ok(Self { unknowns, cholesky, entries: lists.concat(), starts, targets })
+    }
+
+    /// Projects `z`; `scale[i]` is how willingly unknown `i` moves (0 holds it).
+    ///
+    /// # Errors
+    /// [`SolverError::NotFinite`] names a row, [`SolverError::NotPositiveDefinite`] the constraint
+    /// (by its row) that contradicts or repeats others when `shift` is too small.
+    ///
+    /// # Panics
+    /// If the slices do not have one value per unknown.
+    pub fn project(
+        &mut self,
+        constraints: &dyn ResidualBlock,
+        z: &mut [f64],
+        scale: &[f64],
+        options: &ProjectionOptions,
+    ) -> Result<ProjectionReport, SolverError> {
+        assert!(z.len() == self.unknowns && scale.len() == self.unknowns, "one value per unknown");
+        let elements = constraints.elements();
+        let mut residuals = vec![0.0; elements.rows_total()];
+        let mut jacobian = vec![0.0; elements.jacobian_len()];
+        let mut values = vec![0.0; self.cholesky.pattern().len()];
+        let mut trial = z.to_vec();
+        constraints.linearize(z, &mut residuals, &mut jacobian);
+        let mut violation = largest(constraints.name(), &residuals)?;
+        let initial_violation = violation;
+        let mut iterations = 0;
+        let status = loop {
+            if violation <= options.tolerance {
+                break Status::Converged;
+            }
+            if iterations >= options.max_iterations {
+                break Status::IterationLimit;
+            }
+            self.fill(&jacobian, scale, options.shift, &mut values);
+            self.cholesky.factor(&values)?;
+            let mut multipliers = residuals.clone();
+            self.cholesky.solve_in_place(&mut multipliers);
+            for i in 0..self.unknowns {
+                let entries = &self.entries[self.starts[i]..self.starts[i + 1]];
+                let sum: f64 = entries.iter().map(|&(r, k)| jacobian[k] * multipliers[r]).sum();
+                trial[i] = z[i] - scale[i] * scale[i] * sum;
+            }
+            constraints.linearize(&trial, &mut residuals, &mut jacobian);
+            let next = largest(constraints.name(), &residuals)?;
+            if !(next < violation) {
+                break Status::Stalled;
+            }
+            z.copy_from_slice(&trial);
+            violation = next;
+            iterations += 1;
+        };
+        Ok(ProjectionReport { status, iterations, initial_violation, final_violation: violation })
+    }
+
+    /// `J S Sᵀ Jᵀ + shift · max diagonal`.
+    fn fill(&self, jacobian: &[f64], scale: &[f64], shift: f64, values: &mut [f64]) {
+        values.fill(0.0);
+        let mut targets = self.targets.iter();
+        for i in 0..self.unknowns {
+            let entries = &self.entries[self.starts[i]..self.starts[i + 1]];
+            let square = scale[i] * scale[i];
+            for (k, &(_, a)) in entries.iter().enumerate() {
+                for (&(_, b), &to) in entries[..=k].iter().zip(&mut targets) {
+                    values[to] += square * jacobian[a] * jacobian[b];
+                }
+            }
+        }
+        let diagonal = &self.cholesky.pattern().column_starts()[..self.cholesky.pattern().size()];
+        let largest = diagonal.iter().map(|&d| values[d]).fold(0.0, f64::max);
+        let shift = if largest > 0.0 { shift * largest } else { 1.0 };
+        for &d in diagonal {
+            values[d] += shift;
+        }
+    }
+}
+
+fn largest(block: &str, residuals: &[f64]) -> Result<f64, SolverError> {
+    match residuals.iter().position(|r| !r.is_finite()) {
+        None => Ok(residuals.iter().fold(0.0, |m, r| m.max(r.abs()))),
+        Some(row) => Err(SolverError::NotFinite {
+            block: block.to_owned(),
+            row,
+            quantity: Quantity::Residual,
+            value: residuals[row],
+        }),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::quadratic::QuadraticBuilder;
+
+    #[test]
+    fn nearest_point_of_a_sphere_is_along_the_radius() {
+        let mut rows = QuadraticBuilder::new("sphere");
+        let row = rows.equation(1.0).constant(-1.0);
+        for i in 0..3 {
+            row.product(i, i, 1.0);
+        }
+        // Redundant: the same equation again; the shift keeps the system solvable.
+        let row = rows.equation(1.0).constant(-1.0);
+        for i in 0..3 {
+            row.product(i, i, 1.0);
+        }
+        let sphere = rows.build();
+        let mut projection = MinNormProjection::new(&sphere, 3).unwrap();
+        let mut z = [1.02, 2.04, -2.04];
+        let options = ProjectionOptions { tolerance: 1e-14, ..ProjectionOptions::default() };
+        let report = projection.project(&sphere, &mut z, &[1.0; 3], &options).unwrap();
+        assert_eq!(report.status, Status::Converged, "{report:?}");
+        assert!((z[1] - 2.0 * z[0]).abs() < 1e-12 && (z[2] + 2.0 * z[0]).abs() < 1e-12, "{z:?}");
+        let mut held = [0.6, 0.7, 0.1];
+        let report = projection.project(&sphere, &mut held, &[0.0, 1.0, 0.0], &options).unwrap();
+        assert_eq!(report.status, Status::Converged);
+        assert!(held[0] == 0.6 && held[2] == 0.1 && (held[1] - 0.63_f64.sqrt()).abs() < 1e-12);
+    }
+}
