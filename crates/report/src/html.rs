@@ -2,29 +2,202 @@
 
 use std::fmt::Write as _;
 
-use serde_json::Value;
+use serde_json::{Map, Value};
 
-use crate::Report;
+use crate::energies::energies_svg;
+use crate::histogram::histogram_svg;
+use crate::numbers::format_number;
 use crate::page_data::page_data;
+use crate::{Report, SeamTable};
+
+const STYLE: &str = include_str!("viewer/style.css");
+const EXPLORER: &str = include_str!("viewer/explorer.html");
+
+/// The viewer's script in the order its parts build on one another.
+const SCRIPTS: [&str; 12] = [
+    include_str!("viewer/js/decode.js"),
+    include_str!("viewer/js/math.js"),
+    include_str!("viewer/js/mesh.js"),
+    include_str!("viewer/js/gl.js"),
+    include_str!("viewer/js/state.js"),
+    include_str!("viewer/js/scene.js"),
+    include_str!("viewer/js/look.js"),
+    include_str!("viewer/js/legend.js"),
+    include_str!("viewer/js/diagram.js"),
+    include_str!("viewer/js/navigate.js"),
+    include_str!("viewer/js/selection.js"),
+    include_str!("viewer/js/controls.js"),
+];
+const MAIN: &str = include_str!("viewer/js/main.js");
+
+const SHADERS: [(&str, &str); 9] = [
+    ("surface.vert", include_str!("viewer/glsl/surface.vert")),
+    ("surface.frag", include_str!("viewer/glsl/surface.frag")),
+    ("colour.glsl", include_str!("viewer/glsl/colour.glsl")),
+    ("diagram.vert", include_str!("viewer/glsl/diagram.vert")),
+    ("diagram.frag", include_str!("viewer/glsl/diagram.frag")),
+    ("line.vert", include_str!("viewer/glsl/line.vert")),
+    ("line.frag", include_str!("viewer/glsl/line.frag")),
+    ("pick.vert", include_str!("viewer/glsl/pick.vert")),
+    ("pick.frag", include_str!("viewer/glsl/pick.frag")),
+];
+
+/// What a page may load: nothing but what stands in it.
+const POLICY: &str =
+    "default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; img-src data:";
 
 impl Report {
     /// The whole page: text, data and viewer in one file that loads nothing else.
     pub fn to_html(&self) -> String {
-        let (_metrics, run) = self.split_metrics();
+        let (metrics, run) = self.split_metrics();
         let data = page_data(self);
-        let mut page =
-            String::from("<!doctype html>\n<html lang=\"en\"><meta charset=\"utf-8\">\n");
-        let _ = write!(page, "<title>{0}</title>\n<h1>{0}</h1>\n", escape(&self.title));
-        for histogram in &self.histograms {
-            let _ = writeln!(page, "<h2>{}</h2>", escape(&histogram.title));
+        let title = escape(&self.title);
+        let mut page = format!(
+            "<!doctype html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n\
+             <meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n\
+             <meta http-equiv=\"Content-Security-Policy\" content=\"{POLICY}\">\n\
+             <title>Loading {title}</title>\n<style>\n{STYLE}</style>\n</head>\n<body>\n"
+        );
+        page += &self.head();
+        if !self.stages.is_empty() {
+            page += EXPLORER;
         }
+        page += "<main class=\"cards\">\n";
+        page += &self.plots();
+        if let Some(seams) = &self.seams {
+            page += &card("wide", title_or(&seams.title, "Worst seams"), &seam_rows(self, seams));
+        }
+        if !metrics.is_empty() {
+            page += &card("", "Metrics", &table(&flat_rows(&metrics)));
+        }
+        if !self.options.is_empty() {
+            page += &card("", "Options", &table(&self.options));
+        }
+        if !run.is_empty() {
+            let rows = "<table><tbody id=\"run-rows\"></tbody></table>";
+            page += &card("", "This run", rows);
+        }
+        page += "</main>\n<footer>Written by Umbilic. Nothing in this page is loaded from elsewhere.</footer>\n";
         let _ = writeln!(page, "{}", json_block("data", &data.json));
         let _ = writeln!(page, "{}", json_block("run", &Value::Object(run)));
         for (i, text) in data.packed_stages.iter().enumerate() {
             let _ = writeln!(page, "<script type=\"text/plain\" id=\"stage-{i}\">{text}</script>");
         }
+        page += &script();
+        page += "</body>\n</html>\n";
         page
     }
+
+    fn head(&self) -> String {
+        let mut head = format!("<header>\n<h1>{}</h1>\n", escape(&self.title));
+        if !self.status.is_empty() {
+            let class = if self.status == "converged" { "status" } else { "status attention" };
+            let status = escape(&self.status.replace('_', " "));
+            let _ = writeln!(head, "<span class=\"{class}\">{status}</span>");
+        }
+        if !self.command_line.is_empty() {
+            let _ = writeln!(head, "<code>{}</code>", escape(&self.command_line));
+        }
+        head += "</header>\n";
+        if !self.warnings.is_empty() {
+            head += "<ul class=\"warnings\" aria-label=\"Warnings\">\n";
+            for warning in &self.warnings {
+                let _ = writeln!(head, "<li>{}</li>", escape(warning));
+            }
+            head += "</ul>\n";
+        }
+        head
+    }
+
+    fn plots(&self) -> String {
+        let mut cards = String::new();
+        for histogram in &self.histograms {
+            cards += &card("", &histogram.title, &histogram_svg(histogram));
+        }
+        if let Some(history) = &self.energies {
+            cards += &card("", "Energies per iteration", &energies_svg(history));
+        }
+        cards
+    }
+}
+
+fn script() -> String {
+    let mut shaders = Map::new();
+    for (name, source) in SHADERS {
+        shaders.insert(name.to_owned(), Value::from(source));
+    }
+    let shaders = Value::Object(shaders).to_string().replace('<', "\\u003c");
+    let parts = SCRIPTS.join("\n");
+    format!(
+        "<script>\n\"use strict\";\n(() => {{\nconst SHADERS = {shaders};\n{parts}\n{MAIN}}})();\n</script>\n"
+    )
+}
+
+fn card(class: &str, title: &str, content: &str) -> String {
+    let title = escape(title);
+    format!("<section class=\"card {class}\">\n<h2>{title}</h2>\n{content}\n</section>\n")
+}
+
+fn title_or<'a>(title: &'a str, otherwise: &'a str) -> &'a str {
+    if title.is_empty() { otherwise } else { title }
+}
+
+fn table(rows: &[(String, String)]) -> String {
+    let mut text = String::from("<table><tbody>\n");
+    for (name, value) in rows {
+        let (name, value) = (escape(name), escape(value));
+        let _ = writeln!(text, "<tr><th scope=\"row\">{name}</th><td>{value}</td></tr>");
+    }
+    text + "</tbody></table>"
+}
+
+/// Nested metrics as rows named by their dotted path.
+fn flat_rows(metrics: &Map<String, Value>) -> Vec<(String, String)> {
+    let mut rows = Vec::new();
+    for (key, value) in metrics {
+        if let Value::Object(inner) = value {
+            let inner = flat_rows(inner).into_iter();
+            rows.extend(inner.map(|(name, text)| (format!("{key}.{name}"), text)));
+        } else {
+            rows.push((key.clone(), value_text(value)));
+        }
+    }
+    rows
+}
+
+fn value_text(value: &Value) -> String {
+    match value {
+        Value::Number(n) if n.is_f64() => format_number(n.as_f64().unwrap_or(f64::NAN), 5),
+        Value::String(text) => text.clone(),
+        Value::Null => "–".to_owned(),
+        Value::Array(items) => items.iter().map(value_text).collect::<Vec<_>>().join(", "),
+        other => other.to_string(),
+    }
+}
+
+fn seam_rows(report: &Report, seams: &SeamTable) -> String {
+    let mut text =
+        String::from("<div class=\"scroll\"><table>\n<thead><tr><th class=\"words\">seam</th>");
+    for column in &seams.columns {
+        let _ = write!(text, "<th class=\"number\">{}</th>", escape(column));
+    }
+    text += "<th></th></tr></thead>\n<tbody>\n";
+    for (i, seam) in seams.rows.iter().enumerate() {
+        let _ = write!(text, "<tr><td class=\"words\">{}</td>", escape(&seam.label));
+        for (column, &value) in seam.values.iter().enumerate() {
+            let bound = seams.tolerances.get(column).copied().flatten();
+            let beyond = bound.is_some_and(|b| !(value <= b));
+            let class = if beyond { " class=\"beyond\"" } else { "" };
+            let _ = write!(text, "<td{class}>{}</td>", format_number(value, 3));
+        }
+        let show = format!(
+            "<button type=\"button\" data-seam=\"{i}\" aria-label=\"Show {}\">show</button>",
+            escape(&seam.label)
+        );
+        let show = if report.stages.is_empty() { "" } else { &show };
+        let _ = writeln!(text, "<td>{show}</td></tr>");
+    }
+    text + "</tbody></table></div>"
 }
 
 /// Text made harmless for HTML content and attributes.

@@ -43,13 +43,17 @@
 
 mod codec;
 mod colormap;
+mod energies;
 mod error;
+mod histogram;
 mod html;
 mod layers;
+mod numbers;
 mod page_data;
 mod plots;
 mod report;
 mod surface_view;
+mod svg;
 
 pub use error::ReportError;
 pub use layers::{FaceGroups, FieldScale, LineRole, LineSet, ScalarField};

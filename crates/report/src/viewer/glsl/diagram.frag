@@ -1,0 +1,21 @@
+uniform int uMode;
+uniform int uPart;          // 0 all, 1 what is not brushed, 2 what is brushed, 3 the other stage
+uniform float uAlpha;
+
+in float vValue;
+in vec2 vDiagram;
+in float vSelected;
+flat in vec4 vGroup;
+out vec4 colour;
+
+void main() {
+  float inside = brushed(vDiagram, vSelected, vGroup.a);
+  if (uPart == 1 && inside > 0.5) discard;
+  if (uPart == 2 && inside < 0.5) discard;
+  vec3 base = uMode == 0 ? mapped(vValue) : uMode == 1 ? vGroup.rgb : vec3(0.25, 0.36, 0.52);
+  // Points near zero would vanish on white.
+  base *= 0.88;
+  if (uPart == 1) base = vec3(0.87, 0.865, 0.85);
+  if (uPart == 3) base = vec3(0.70, 0.71, 0.73);
+  colour = vec4(base * uAlpha, uAlpha);
+}
