@@ -44,6 +44,7 @@ impl OutputArgs {
                     path.display()
                 )));
             }
+            exchange::check_format(path).map_err(|e| Failure::input(path, e))?;
             check_output_path(path)?;
         }
         Ok(())

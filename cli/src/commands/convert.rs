@@ -17,6 +17,7 @@ pub(crate) struct Convert {
 
 impl Convert {
     pub(crate) fn run(self, _context: &Context) -> Result<Outcome, Failure> {
+        exchange::check_format(&self.output).map_err(|e| Failure::input(&self.output, e))?;
         check_output_path(&self.output)?;
         let model =
             exchange::read_model(&self.input).map_err(|e| Failure::input(&self.input, e))?;

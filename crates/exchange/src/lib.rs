@@ -1,15 +1,44 @@
 //! File formats to and from Umbilic's types, with limits against hostile input and atomic writing.
+//!
+//! [`read_model`] reads any file by its extension into a [`Model`]; [`encode_model`] gives the bytes
+//! of a file, and [`write_files`] puts several files on the disk at once, or none of them.
+//!
+//! # Example
+//! ```
+//! use exchange::{Model, encode_model, decode_model};
+//! let scene = "(unit: \"m\", surfaces: [(name: \"saddle\", u: (degree: 1), v: (degree: 1),
+//!     control_points: [[(0, 0, 0), (0, 1, 0)], [(1, 0, 0), (1, 1, 1)]])])";
+//! let model = decode_model("ron", scene.into())?;
+//! let step = encode_model("saddle.step".as_ref(), &model)?;
+//! assert!(step.starts_with(b"ISO-10303-21;"));
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
 
+mod color;
 mod error;
 mod files;
+mod glb;
 mod mesh;
 mod model;
 mod obj;
 mod ron_text;
+mod sample;
+mod scene;
+mod step;
+mod triangulate;
+mod unit;
 
 pub use error::{ReadError, WriteError};
 pub use files::{check_writable, read_bytes, read_text, write_files};
+pub use glb::write_glb;
 pub use mesh::{Field, Group, IndexLists, Mesh};
-pub use model::{Model, READABLE, WRITABLE, decode_model, encode_model, extension_of, read_model};
+pub use model::{
+    Model, NamedSurface, PointGrid, READABLE, WRITABLE, check_format, decode_model, encode_model,
+    extension_of, read_model,
+};
 pub use obj::{read_obj, write_obj};
 pub use ron_text::{from_ron, read_ron, to_ron};
+pub use sample::surface_mesh;
+pub use scene::{read_scene, write_scene};
+pub use step::write_step;
+pub use unit::LengthUnit;

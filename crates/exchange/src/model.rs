@@ -2,23 +2,83 @@
 
 use crate::error::{ReadError, WriteError};
 use crate::files::{into_text, read_bytes};
+use crate::glb::write_glb;
 use crate::mesh::Mesh;
 use crate::obj::{read_obj, write_obj};
+use crate::sample::surface_mesh;
+use crate::scene::{read_scene, write_scene};
+use crate::step::write_step;
+use crate::unit::LengthUnit;
+use bspline::BsplineSurface;
+use geom_core::DVec3;
+use std::borrow::Cow;
 use std::path::Path;
+
+/// A surface with the name it has in files; the name may be empty.
+#[derive(Clone, Debug, PartialEq)]
+pub struct NamedSurface {
+    /// Shown as the face's name in CAD programs.
+    pub name: String,
+    /// The surface.
+    pub surface: BsplineSurface,
+}
+
+/// A regular grid of points, `points[i * n_v + j]`.
+#[derive(Clone, Debug, PartialEq)]
+pub struct PointGrid {
+    /// The name, may be empty.
+    pub name: String,
+    /// Number of points in the first direction.
+    pub n_u: usize,
+    /// Number of points in the second direction.
+    pub n_v: usize,
+    /// The points.
+    pub points: Vec<DVec3>,
+}
 
 /// The content of a file.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Model {
+    /// What a coordinate of 1 means.
+    pub unit: LengthUnit,
+    /// B-spline surfaces.
+    pub surfaces: Vec<NamedSurface>,
+    /// Point grids.
+    pub grids: Vec<PointGrid>,
     /// Meshes, polylines and points.
     pub meshes: Vec<Mesh>,
     /// What the reader had to leave out.
     pub warnings: Vec<String>,
 }
 
+impl Model {
+    /// One surface, nothing else.
+    #[must_use]
+    pub fn of_surface(name: &str, surface: BsplineSurface, unit: LengthUnit) -> Self {
+        let surfaces = vec![NamedSurface { name: name.to_owned(), surface }];
+        Self { unit, surfaces, ..Self::default() }
+    }
+
+    /// One mesh, nothing else.
+    #[must_use]
+    pub fn of_mesh(mesh: Mesh, unit: LengthUnit) -> Self {
+        Self { unit, meshes: vec![mesh], ..Self::default() }
+    }
+
+    /// The meshes, after sampled meshes of the surfaces.
+    fn sampled(&self) -> Cow<'_, [Mesh]> {
+        if self.surfaces.is_empty() {
+            return Cow::Borrowed(&self.meshes);
+        }
+        let sampled = self.surfaces.iter().map(|s| surface_mesh(&s.name, &s.surface, None));
+        Cow::Owned(sampled.chain(self.meshes.iter().cloned()).collect())
+    }
+}
+
 /// Extensions that [`read_model`] knows.
-pub const READABLE: &str = "obj";
+pub const READABLE: &str = "ron, obj";
 /// Extensions that [`encode_model`] knows.
-pub const WRITABLE: &str = "obj";
+pub const WRITABLE: &str = "ron, step, stp, obj, glb";
 
 /// Reads any file of geometry, by its extension.
 ///
@@ -26,7 +86,7 @@ pub const WRITABLE: &str = "obj";
 /// [`ReadError`] of the reader, or [`ReadError::UnknownFormat`].
 pub fn read_model(path: &Path) -> Result<Model, ReadError> {
     let extension = extension_of(path);
-    if !READABLE.split(", ").any(|known| known == extension) {
+    if !is_listed(READABLE, &extension) {
         return Err(ReadError::UnknownFormat { extension, known: READABLE });
     }
     decode_model(&extension, read_bytes(path)?)
@@ -38,15 +98,30 @@ pub fn read_model(path: &Path) -> Result<Model, ReadError> {
 /// As [`read_model`].
 pub fn decode_model(extension: &str, bytes: Vec<u8>) -> Result<Model, ReadError> {
     match extension {
+        "ron" => read_scene(&into_text(bytes)?),
         "obj" => {
             let (mesh, warnings) = read_obj(&into_text(bytes)?)?;
-            Ok(Model { meshes: vec![mesh], warnings })
+            Ok(Model { meshes: vec![mesh], warnings, ..Model::default() })
         }
         _ => Err(ReadError::UnknownFormat { extension: extension.into(), known: READABLE }),
     }
 }
 
-/// The bytes of a file at `path`, by its extension.
+/// Refuses extensions that [`encode_model`] does not know: to be asked before a long computation.
+///
+/// # Errors
+/// [`WriteError::UnknownFormat`].
+pub fn check_format(path: &Path) -> Result<(), WriteError> {
+    let extension = extension_of(path);
+    if is_listed(WRITABLE, &extension) {
+        Ok(())
+    } else {
+        Err(WriteError::UnknownFormat { extension, known: WRITABLE })
+    }
+}
+
+/// The bytes of a file at `path`, by its extension. Formats without surfaces get sampled meshes
+/// of them, with curvatures where the format can carry them.
 ///
 /// # Errors
 /// [`WriteError::UnknownFormat`], or [`WriteError::Unsupported`] for content that the format
@@ -54,9 +129,36 @@ pub fn decode_model(extension: &str, bytes: Vec<u8>) -> Result<Model, ReadError>
 pub fn encode_model(path: &Path, model: &Model) -> Result<Vec<u8>, WriteError> {
     let extension = extension_of(path);
     match extension.as_str() {
-        "obj" => Ok(write_obj(&model.meshes).into_bytes()),
+        "ron" => {
+            no_meshes("a RON scene", model)?;
+            let text =
+                write_scene(model).map_err(|e| unsupported("a RON scene", &e.to_string()))?;
+            Ok(text.into_bytes())
+        }
+        "step" | "stp" => {
+            no_meshes("STEP", model)?;
+            if model.surfaces.is_empty() {
+                return Err(unsupported("STEP", "a model without surfaces"));
+            }
+            Ok(write_step(model).into_bytes())
+        }
+        "obj" => Ok(write_obj(&model.sampled()).into_bytes()),
+        "glb" => Ok(write_glb(&model.sampled(), &model.unit)),
         _ => Err(WriteError::UnknownFormat { extension, known: WRITABLE }),
     }
+}
+
+fn no_meshes(format: &'static str, model: &Model) -> Result<(), WriteError> {
+    if model.meshes.is_empty() { Ok(()) } else { Err(unsupported(format, "meshes")) }
+}
+
+fn unsupported(format: &'static str, what: &str) -> WriteError {
+    let mend = "choose another extension, or fit surfaces first".to_owned();
+    WriteError::Unsupported { format, what: what.to_owned(), mend }
+}
+
+fn is_listed(list: &str, extension: &str) -> bool {
+    list.split(", ").any(|known| known == extension)
 }
 
 /// The extension in lower case, empty if there is none.

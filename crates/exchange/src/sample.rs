@@ -1,0 +1,75 @@
+//! Surfaces as meshes with exact normals and curvatures, for formats that know no splines.
+
+use crate::mesh::{Field, IndexLists, Mesh};
+use bspline::{BsplineSurface, KnotVector};
+use geom_core::{SurfaceJet, principal_curvatures};
+
+/// Most cells in one direction of a sampled surface.
+const MOST_CELLS: usize = 256;
+/// How far beside a pole curvatures are taken, as a share of the domain.
+const BESIDE: f64 = 1e-4;
+
+/// Quads over a grid of `cells` (u, v) equal parameter cells, by default about four per knot span,
+/// with exact unit normals `S_u × S_v` and the fields `H`, `K`, `k1`, `k2` per vertex.
+///
+/// At a singular point (a pole) normal and curvatures are taken slightly towards the middle of the
+/// domain, and are zero where that is singular too.
+#[must_use]
+pub fn surface_mesh(name: &str, surface: &BsplineSurface, cells: Option<(usize, usize)>) -> Mesh {
+    let (ku, kv) = (surface.knots_u(), surface.knots_v());
+    let (cells_u, cells_v) = cells.unwrap_or_else(|| (default_cells(ku), default_cells(kv)));
+    let (us, vs) = (parameters(ku, cells_u), parameters(kv, cells_v));
+    let jets = surface.jet_grid(&us, &vs, 2);
+    let mut mesh = Mesh {
+        name: name.to_owned(),
+        positions: jets.iter().map(SurfaceJet::position).collect(),
+        faces: grid_faces(us.len(), vs.len(), cells_u, cells_v),
+        ..Mesh::default()
+    };
+    let mut fields = ["H", "K", "k1", "k2"]
+        .map(|name| Field { name: name.to_owned(), values: Vec::with_capacity(jets.len()) });
+    for (k, jet) in jets.iter().enumerate() {
+        let (u, v) = (us[k / vs.len()], vs[k % vs.len()]);
+        let measured =
+            measure(jet).or_else(|| measure(&surface.jet(inwards(ku, u), inwards(kv, v), 2)));
+        let (normal, values) = measured.unwrap_or_default();
+        mesh.normals.push(normal.into());
+        fields.iter_mut().zip(values).for_each(|(field, value)| field.values.push(value));
+    }
+    mesh.vertex_fields = fields.into();
+    mesh
+}
+
+/// Normal, and H, K, k1, k2.
+fn measure(jet: &SurfaceJet) -> Option<([f64; 3], [f64; 4])> {
+    let normal = jet.normal().ok()?;
+    let (first, second) = (jet.first_form(), jet.second_form().ok()?);
+    let principal = principal_curvatures(first, second).ok()?;
+    let (h, k) = (jet.mean_curvature().ok()?, jet.gaussian_curvature().ok()?);
+    Some((normal.to_array(), [h, k, principal.k1, principal.k2]))
+}
+
+fn default_cells(knots: &KnotVector) -> usize {
+    (4 * (knots.breaks().len() - 1)).clamp(32, MOST_CELLS)
+}
+
+/// Ends of the cells; the last is left out in a periodic direction, where it is the first again.
+fn parameters(knots: &KnotVector, cells: usize) -> Vec<f64> {
+    knots.uniform_parameters(if knots.is_periodic() { cells } else { cells + 1 })
+}
+
+fn inwards(knots: &KnotVector, t: f64) -> f64 {
+    let (start, end) = knots.domain();
+    t + BESIDE * (0.5 * (start + end) - t)
+}
+
+fn grid_faces(n_u: usize, n_v: usize, cells_u: usize, cells_v: usize) -> IndexLists {
+    let mut faces = IndexLists::default();
+    let vertex = |i: usize, j: usize| ((i % n_u) * n_v + j % n_v) as u32;
+    for i in 0..cells_u {
+        for j in 0..cells_v {
+            faces.push(&[vertex(i, j), vertex(i + 1, j), vertex(i + 1, j + 1), vertex(i, j + 1)]);
+        }
+    }
+    faces
+}
