@@ -249,7 +249,7 @@ mod tests {
                 "surface `s`: row 2 of the control points has 2 entries and row 1 has 1",
             ),
             (("(1, 1, 1)", "(1, NaN, 1)"), "surface `s`: control point 3 is [1, NaN, 1]"),
-            (("name:", "nam:"), "line 1: column 15"),
+            (("name:", "nam:"), "line 1: column 14"),
             (("(surfaces", "(unit: \"ell\", surfaces"), "`ell` is not a unit of length; use mm"),
             (
                 ("control_points", "weights: [[1, 1], [1, 0]], control_points"),
