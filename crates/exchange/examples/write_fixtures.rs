@@ -11,7 +11,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let scenes: [(&str, BsplineSurface); 8] = [
         ("roof", Shape::Roof.surface(14, 14, 4, 4)),
         ("saddle", Shape::Saddle.surface(14, 14, 4, 4)),
-        ("near-helical", Shape::NearHelical.surface(16, 10, 5, 5)),
+        ("near-helical", Shape::Helical.surface(16, 10, 5, 5)),
         ("eggbox", Shape::Eggbox.surface(10, 10, 4, 4)),
         ("tube", Shape::Tube.surface(14, 12, 4, 4)),
         ("plane", surfaces::plane(8, 8, 4)),

@@ -36,8 +36,8 @@ pub fn read_ron<T: DeserializeOwned>(path: &Path) -> Result<T, ReadError> {
 /// # Errors
 /// [`ron::Error`] for types RON cannot express.
 pub fn to_ron<T: Serialize>(value: &T) -> Result<String, ron::Error> {
-    // Rows of numbers stay on one line each; only the outer levels are broken.
-    let layout = PrettyConfig::new().indentor("  ").depth_limit(3).compact_arrays(false);
+    // Rows of numbers stay on one line each.
+    let layout = PrettyConfig::new().indentor("  ").depth_limit(4).compact_arrays(false);
     let options = ron::Options::default().with_default_extension(Extensions::IMPLICIT_SOME);
     let mut text = options.to_string_pretty(value, layout)?;
     text.push('\n');
