@@ -1,9 +1,24 @@
 //! Smooth skins of rational bilinear patches on asymptotic nets, and their Darboux transforms.
 
+mod blocks;
+mod boundary;
+mod descend;
 mod error;
+mod hyperbolic_net;
 mod join;
+mod joint;
+mod lelieuvre;
+mod net;
 mod patch;
+mod polish;
+mod shape;
 
+pub use boundary::Boundary;
+pub use descend::StepRecord;
 pub use error::{NetError, PatchError};
+pub use hyperbolic_net::{HyperbolicNet, KINK_SAMPLES, KinkStatistics, distances, star_planarity};
 pub use join::EdgeJoin;
+pub use joint::{JointOptions, NetReport, solve_joint};
+pub use net::{Family, InnerEdge, NetEdge, QuadNet};
 pub use patch::{BilinearPatch, PatchJet, Quadric};
+pub use shape::{ShapeFit, Spread, best_log_factor, fit_shape_parameters};

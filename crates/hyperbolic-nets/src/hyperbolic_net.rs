@@ -1,0 +1,230 @@
+//! A net with a shape parameter for every face: the finished surface, and how smooth it is.
+
+use crate::{BilinearPatch, NetError, PatchError, QuadNet};
+use geom_core::{ClosestPoint, DVec3};
+use rayon::prelude::*;
+
+/// Points at which tangent planes are compared along every inner edge.
+pub const KINK_SAMPLES: usize = 11;
+
+/// Quads with one rational bilinear patch each.
+#[derive(Clone, Debug)]
+pub struct HyperbolicNet {
+    net: QuadNet,
+    normals: Option<Vec<DVec3>>,
+    shape: Vec<f64>,
+}
+
+/// Largest and mean kink over the inner edges.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct KinkStatistics {
+    /// Largest angle, in radians.
+    pub max: f64,
+    /// Mean over the edges of the largest angle of each, in radians.
+    pub mean: f64,
+    /// Edges at which the surface folds back on itself.
+    pub folds: usize,
+}
+
+impl HyperbolicNet {
+    /// Joins a net, its Lelieuvre normals if they are known, and the shape parameters of the
+    /// diagonals 0–2.
+    ///
+    /// # Errors
+    /// [`NetError`] if counts do not match or a shape parameter is not positive.
+    pub fn new(
+        net: QuadNet,
+        normals: Option<Vec<DVec3>>,
+        shape: Vec<f64>,
+    ) -> Result<Self, NetError> {
+        let (faces, vertices) = (net.quads().len(), net.positions().len());
+        if shape.len() != faces {
+            return Err(NetError::WrongCount {
+                what: "shape parameters",
+                found: shape.len(),
+                needed: faces,
+            });
+        }
+        if let Some(found) = normals.as_ref().map(Vec::len).filter(|n| *n != vertices) {
+            return Err(NetError::WrongCount { what: "normals", found, needed: vertices });
+        }
+        if let Some(face) = shape.iter().position(|&w| !(w > 0.0 && w < f64::INFINITY)) {
+            return Err(NetError::BadShapeParameter { face, value: shape[face] });
+        }
+        Ok(Self { net, normals, shape })
+    }
+
+    /// The net.
+    #[must_use]
+    pub fn net(&self) -> &QuadNet {
+        &self.net
+    }
+
+    /// Lelieuvre normals, if the net has them: `x_j − x_i = ± ν_i × ν_j` along its edges.
+    #[must_use]
+    pub fn normals(&self) -> Option<&[DVec3]> {
+        self.normals.as_deref()
+    }
+
+    /// Shape parameters of the diagonals 0–2.
+    #[must_use]
+    pub fn shape(&self) -> &[f64] {
+        &self.shape
+    }
+
+    /// The patch of a face, weights `(1, 1, W, 1)`.
+    ///
+    /// # Errors
+    /// [`PatchError`] if a corner is not finite.
+    pub fn patch(&self, face: usize) -> Result<BilinearPatch, PatchError> {
+        let corners = self.net.quads()[face].map(|v| self.net.positions()[v as usize]);
+        BilinearPatch::from_shape_parameter(corners, self.shape[face])
+    }
+
+    /// All patches, in the order of the faces.
+    ///
+    /// # Errors
+    /// As [`Self::patch`].
+    pub fn patches(&self) -> Result<Vec<BilinearPatch>, PatchError> {
+        (0..self.shape.len()).map(|f| self.patch(f)).collect()
+    }
+
+    /// Largest angle between the tangent planes at [`KINK_SAMPLES`] points of every inner edge, in
+    /// radians and in the order of [`QuadNet::inner_edges`].
+    #[must_use]
+    pub fn kinks(&self) -> Vec<f64> {
+        kinks(&self.net, self.net.positions(), &self.shape)
+    }
+
+    /// Kinks in brief.
+    #[must_use]
+    pub fn kink_statistics(&self) -> KinkStatistics {
+        let kinks = self.kinks();
+        let positions = self.net.positions();
+        let folded = |e: &&crate::InnerEdge| self.net.join(e, positions).is_folded();
+        KinkStatistics {
+            max: kinks.iter().copied().fold(0.0, f64::max),
+            mean: kinks.iter().sum::<f64>() / kinks.len().max(1) as f64,
+            folds: self.net.inner_edges().iter().filter(folded).count(),
+        }
+    }
+}
+
+/// As [`HyperbolicNet::kinks`], for positions and shape parameters on their way.
+pub(crate) fn kinks(net: &QuadNet, positions: &[DVec3], shape: &[f64]) -> Vec<f64> {
+    net.inner_edges()
+        .par_iter()
+        .map(|e| {
+            let [f, g] = e.faces;
+            let power = |w: f64, e: f64| if e > 0.0 { w } else { 1.0 / w };
+            let left = power(shape[f], e.exponents[0]);
+            let right = power(shape[g], e.exponents[1]);
+            net.join(e, positions).kink(left, right, KINK_SAMPLES)
+        })
+        .collect()
+}
+
+/// Largest distance of a vertex or one of its neighbours from the best plane of its star, as a
+/// share of the mean edge length.
+#[must_use]
+pub fn star_planarity(net: &QuadNet) -> f64 {
+    let h = net.mesh().mean_edge_length();
+    let star = |v: usize| {
+        let mut points: Vec<DVec3> = net.ring(v).map(|w| net.positions()[w]).collect();
+        points.push(net.positions()[v]);
+        if points.len() < 4 { 0.0 } else { distance_from_best_plane(&points) / h }
+    };
+    (0..net.positions().len()).map(star).fold(0.0, f64::max)
+}
+
+/// Largest distance of the points from the plane that minimises the sum of squares.
+fn distance_from_best_plane(points: &[DVec3]) -> f64 {
+    let centre = points.iter().sum::<DVec3>() / points.len() as f64;
+    let mut covariance = [[0.0; 3]; 3];
+    for p in points {
+        let d = (*p - centre).to_array();
+        for i in 0..3 {
+            for j in 0..3 {
+                covariance[i][j] += d[i] * d[j];
+            }
+        }
+    }
+    let normal = smallest_eigenvector(covariance);
+    points.iter().map(|p| (*p - centre).dot(normal).abs()).fold(0.0, f64::max)
+}
+
+/// Unit eigenvector of the smallest eigenvalue of a symmetric matrix, by Jacobi rotations.
+pub(crate) fn smallest_eigenvector(mut a: [[f64; 3]; 3]) -> DVec3 {
+    let mut vectors = [DVec3::X, DVec3::Y, DVec3::Z];
+    for _ in 0..30 {
+        let off = a[0][1].abs() + a[0][2].abs() + a[1][2].abs();
+        if off <= 1e-300 {
+            break;
+        }
+        for (p, q) in [(0, 1), (0, 2), (1, 2)] {
+            if a[p][q] == 0.0 {
+                continue;
+            }
+            let theta = (a[q][q] - a[p][p]) / (2.0 * a[p][q]);
+            let t = theta.signum() / (theta.abs() + (theta * theta + 1.0).sqrt());
+            let c = 1.0 / (t * t + 1.0).sqrt();
+            let s = t * c;
+            for k in 0..3 {
+                (a[k][p], a[k][q]) = (c * a[k][p] - s * a[k][q], s * a[k][p] + c * a[k][q]);
+            }
+            for k in 0..3 {
+                (a[p][k], a[q][k]) = (c * a[p][k] - s * a[q][k], s * a[p][k] + c * a[q][k]);
+            }
+            (vectors[p], vectors[q]) =
+                (vectors[p] * c - vectors[q] * s, vectors[p] * s + vectors[q] * c);
+        }
+    }
+    let smallest = (0..3).min_by(|&i, &j| a[i][i].total_cmp(&a[j][j])).unwrap_or(0);
+    vectors[smallest]
+}
+
+/// Distances of all vertices from a surface, in model units.
+#[must_use]
+pub fn distances(positions: &[DVec3], reference: &dyn ClosestPoint) -> Vec<f64> {
+    positions.par_iter().map(|p| reference.closest_point(*p).point.distance(*p)).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{Spread, fit_shape_parameters};
+    use fixtures::asymptotic_nets;
+    use geom_core::PolyMesh;
+
+    #[test]
+    fn best_plane_of_a_bent_star() {
+        let bent = [DVec3::X, -DVec3::X, DVec3::Y, -DVec3::Y, DVec3::Z * 0.1];
+        let flat = bent.map(|p| DVec3::new(p.x, p.y, 0.3 * p.x));
+        assert!((distance_from_best_plane(&bent) - 0.08).abs() < 1e-12);
+        assert!(distance_from_best_plane(&flat) < 1e-16);
+    }
+
+    #[test]
+    fn exact_net_has_no_kink_and_planar_stars() {
+        let model = asymptotic_nets::moutard(8, 7, 2);
+        let net = QuadNet::new(&PolyMesh::new(model.positions, &model.quads).unwrap()).unwrap();
+        assert!(star_planarity(&net) < 1e-13);
+        let shape =
+            fit_shape_parameters(&net, net.positions(), Spread::LeastSquares).unwrap().shape;
+        let surface = HyperbolicNet::new(net, None, shape).unwrap();
+        let kinks = surface.kink_statistics();
+        assert!(kinks.max < 1e-9 && kinks.folds == 0, "{kinks:?}");
+    }
+
+    #[test]
+    fn wrong_counts_and_parameters_are_refused() {
+        let model = asymptotic_nets::moutard(2, 2, 2);
+        let net = QuadNet::new(&PolyMesh::new(model.positions, &model.quads).unwrap()).unwrap();
+        let error = HyperbolicNet::new(net.clone(), None, vec![1.0; 3]).unwrap_err();
+        assert_eq!(error.to_string(), "shape parameters: 3 values for 4; give one for each");
+        let error = HyperbolicNet::new(net.clone(), Some(vec![]), vec![1.0; 4]).unwrap_err();
+        assert!(matches!(error, NetError::WrongCount { what: "normals", .. }));
+        let error = HyperbolicNet::new(net, None, vec![1.0, 1.0, 0.0, 1.0]).unwrap_err();
+        assert_eq!(error, NetError::BadShapeParameter { face: 2, value: 0.0 });
+    }
+}
