@@ -40,5 +40,5 @@ pub use obj::{read_obj, write_obj};
 pub use ron_text::{from_ron, read_ron, to_ron};
 pub use sample::surface_mesh;
 pub use scene::{read_scene, write_scene};
-pub use step::write_step;
+pub use step::{read_step, write_step};
 pub use unit::LengthUnit;

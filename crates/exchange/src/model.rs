@@ -7,7 +7,7 @@ use crate::mesh::Mesh;
 use crate::obj::{read_obj, write_obj};
 use crate::sample::surface_mesh;
 use crate::scene::{read_scene, write_scene};
-use crate::step::write_step;
+use crate::step::{read_step, write_step};
 use crate::unit::LengthUnit;
 use bspline::BsplineSurface;
 use geom_core::DVec3;
@@ -76,7 +76,7 @@ impl Model {
 }
 
 /// Extensions that [`read_model`] knows.
-pub const READABLE: &str = "ron, obj";
+pub const READABLE: &str = "ron, step, stp, obj";
 /// Extensions that [`encode_model`] knows.
 pub const WRITABLE: &str = "ron, step, stp, obj, glb";
 
@@ -99,6 +99,7 @@ pub fn read_model(path: &Path) -> Result<Model, ReadError> {
 pub fn decode_model(extension: &str, bytes: Vec<u8>) -> Result<Model, ReadError> {
     match extension {
         "ron" => read_scene(&into_text(bytes)?),
+        "step" | "stp" => read_step(&bytes),
         "obj" => {
             let (mesh, warnings) = read_obj(&into_text(bytes)?)?;
             Ok(Model { meshes: vec![mesh], warnings, ..Model::default() })
