@@ -11,6 +11,8 @@ mod lelieuvre;
 mod net;
 mod patch;
 mod polish;
+mod published;
+mod quad_distance;
 mod shape;
 
 pub use boundary::Boundary;
@@ -21,4 +23,5 @@ pub use join::EdgeJoin;
 pub use joint::{JointOptions, NetReport, solve_joint};
 pub use net::{Family, InnerEdge, NetEdge, QuadNet};
 pub use patch::{BilinearPatch, PatchJet, Quadric};
+pub use published::{FairnessOrder, PublishedOptions, StarPlanarity, solve_published};
 pub use shape::{ShapeFit, Spread, best_log_factor, fit_shape_parameters};

@@ -99,7 +99,7 @@ impl QuadNet {
                 let (g, l) = (g.index(), twin.index() % 4);
                 let left = |c: usize| quads[f][(k + c) % 4] as usize;
                 let right = |c: usize| quads[g][(l + c) % 4] as usize;
-                let sign = |corner: usize| if corner % 2 == 0 { 1.0 } else { -1.0 };
+                let sign = |corner: usize| if corner.is_multiple_of(2) { 1.0 } else { -1.0 };
                 inner.push(InnerEdge {
                     faces: [f, g],
                     b: [left(0), left(3), left(2), left(1), right(3), right(2)],
