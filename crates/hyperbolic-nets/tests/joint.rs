@@ -1,4 +1,5 @@
 //! The joint solver on jittered nets of every topology.
+#![allow(clippy::unwrap_used, reason = "a test may panic")]
 
 use fixtures::asymptotic_nets::{self, AsymptoticNet};
 use geom_core::PolyMesh;

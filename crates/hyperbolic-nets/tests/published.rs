@@ -1,4 +1,5 @@
 //! The published pipeline against the recorded kinks of an independent program.
+#![allow(clippy::unwrap_used, reason = "a test may panic")]
 
 use fixtures::asymptotic_nets::{self, AsymptoticNet};
 use geom_core::PolyMesh;
