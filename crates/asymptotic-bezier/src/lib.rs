@@ -1,1 +1,27 @@
-//! Being built.
+//! Bezier patches bounded by asymptotic curves, and gridshells filled with them.
+
+mod bernstein;
+mod boundary;
+mod bounds;
+mod curve;
+mod data;
+mod dense;
+mod error;
+mod field;
+mod fill;
+mod patch;
+mod quad;
+mod surface;
+mod torsion_qp;
+mod vertex;
+
+pub use boundary::{
+    BOUNDARY_DEGREES, Boundary, BoundaryEnergy, BoundaryOptions, TorsionHandle, solve_boundary,
+};
+pub use curve::{BezierCurve, CurveJet, CurveQuality};
+pub use data::{AsymptoticNet, CornerData, Curvatures, DATA_DEGREE, NetCurve, NetFace};
+pub use error::{AsymptoticError, AsymptoticWarning, Place};
+pub use fill::MAX_SURFACE_DEGREE;
+pub use patch::{Ansatz, FilledPatch, PatchBoundary, PatchOptions, fill_patch};
+pub use quad::{Quadrilateral, solve_quadrilateral};
+pub use surface::{Patch, PatchJet};

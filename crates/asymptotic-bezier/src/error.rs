@@ -1,0 +1,196 @@
+//! What cannot be attempted, and what is built but worth a word.
+
+use std::fmt;
+
+/// Which of the four boundary curves or which corner of a net a message is about.
+///
+/// Single patches number curves 1 to 4 as the paper does (`r1` at v = 0, `r2` at u = 0, `r3` at
+/// v = 1, `r4` at u = 1) and name corners `00`, `10`, `01`, `11`; nets count from 0.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Place {
+    /// Curve `r1..r4` of a single patch, 0-based here, 1-based in messages.
+    PatchCurve(usize),
+    /// Corner of a single patch: 0 is `00`, 1 is `10`, 2 is `01`, 3 is `11`.
+    PatchCorner(usize),
+    /// Curve of a net.
+    NetCurve(usize),
+    /// Vertex of a net.
+    NetVertex(usize),
+    /// Face of a net, or the patch that fills it.
+    Patch(usize),
+}
+
+impl fmt::Display for Place {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::PatchCurve(i) => write!(f, "curve {}", i + 1),
+            Self::PatchCorner(c) => {
+                write!(f, "corner {}", ["00", "10", "01", "11"].get(*c).unwrap_or(&"?"))
+            }
+            Self::NetCurve(i) => write!(f, "net curve {i}"),
+            Self::NetVertex(v) => write!(f, "vertex {v}"),
+            Self::Patch(p) => write!(f, "patch {p}"),
+        }
+    }
+}
+
+/// Why corner data or a net cannot be bounded by asymptotic curves or filled.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+#[expect(missing_docs, reason = "the messages spell out every field")]
+pub enum AsymptoticError {
+    /// NaN or infinity in the input.
+    #[error("{place}: {what} is not finite; every coordinate and curvature must be a number")]
+    NotFinite { place: Place, what: &'static str },
+    /// Tangent control point on its corner, or a zero tangent.
+    #[error(
+        "{place}: the tangent point at the {end} coincides with the corner (arm length {length:.3e}); move it along the wanted tangent"
+    )]
+    CoincidentTangent { place: Place, end: &'static str, length: f64 },
+    /// The two curves leave the corner along one line.
+    #[error(
+        "{place}: boundary tangents are parallel (sine {sine:.3e}, at least 1e-6 needed); turn one of the tangents"
+    )]
+    ParallelTangents { place: Place, sine: f64 },
+    /// Three or more tangents at one vertex that do not share a plane.
+    #[error(
+        "{place}: the tangents leave their common plane by {angle_deg:.3} degrees (limit {limit_deg}); asymptotic curves through one point lie in one tangent plane"
+    )]
+    TangentsNotCoplanar { place: Place, angle_deg: f64, limit_deg: f64 },
+    /// `k = 0` at the end of a curve that is not declared straight.
+    #[error(
+        "{place}: zero curvature at the {end} of a curve that is not a line; give a curvature, or declare the curve a line"
+    )]
+    ZeroCurvature { place: Place, end: &'static str },
+    /// A declared line whose tangents leave the chord.
+    #[error(
+        "{place}: declared a line but its tangents leave the chord (sine {sine:.3e}); align them or drop the declaration"
+    )]
+    LineNotStraight { place: Place, sine: f64 },
+    /// A declared line with curvature data.
+    #[error(
+        "{place}: declared a line but curvature {curvature} is given at the {end}; set it to 0"
+    )]
+    LineWithCurvature { place: Place, end: &'static str, curvature: f64 },
+    /// End curvatures whose signs need an inflection that is not declared.
+    #[error(
+        "{place}: the end curvatures bend to opposite sides, so the curve has an odd number of inflections, but {declared} are declared; flip a sign or declare the inflection"
+    )]
+    InflectionParity { place: Place, declared: usize },
+    /// The solved curve has an inflection nobody declared.
+    #[error(
+        "{place}: undeclared inflection, the binormal reverses at t = {t:.6}; declare it or change the end curvatures"
+    )]
+    UndeclaredInflection { place: Place, t: f64 },
+    /// The declared inflection could not be built.
+    #[error(
+        "{place}: no curve with the declared inflections found (defect {defect:.3e} after {iterations} iterations); change the end data or drop the declaration"
+    )]
+    InflectionNotFound { place: Place, defect: f64, iterations: usize },
+    /// Torsion equation without unknowns and with a defect.
+    #[error(
+        "{place}: the torsion equation has no solution (both far tangents lie in the corner plane), defect {defect:.3e}; move one of the far tangents out of the plane"
+    )]
+    TorsionInfeasible { place: Place, defect: f64 },
+    /// Prescribed torsions or bounds that contradict the data or one another.
+    #[error(
+        "{place}: torsion is bounded below by {min} and above by {max}; no value satisfies both"
+    )]
+    TorsionBounds { place: Place, min: f64, max: f64 },
+    /// `r′` vanishes.
+    #[error(
+        "{place}: cusp, the speed falls to {relative_speed:.3e} of its mean; shorten the tangents or lower the curvature"
+    )]
+    Cusp { place: Place, relative_speed: f64 },
+    /// The tangent fields cannot match tangents and twists at the corners.
+    #[error(
+        "{place}: corner and twist equations contradict one another, residual {residual:.3e}; the boundary violates the torsion condition"
+    )]
+    CornerEquations { place: Place, residual: f64 },
+    /// The crossing field changes sign and the bounds cannot prevent it.
+    #[error(
+        "{place}: the patch folds along {curve} (transversality {worst:.3} of the corner values at t = {t:.3}) and the bounds cannot be met at bi-{degree}; raise the degree or mend the corner data"
+    )]
+    Folded { place: Place, curve: Place, worst: f64, t: f64, degree: usize },
+    /// Degree outside what the construction offers.
+    #[error("degree {degree} of the {what} is outside {min}..={max}")]
+    Degree { what: &'static str, degree: usize, min: usize, max: usize },
+    /// Quartic data: osculating planes at the ends of a curve that do not meet in a line.
+    #[error(
+        "{place}: the corner planes at both ends are parallel (sine {sine:.3e}), so a quartic has no middle point; use a quintic"
+    )]
+    QuarticPlanes { place: Place, sine: f64 },
+    /// Quartic data without solution.
+    #[error(
+        "the four torsion equations of the quartic quadrilateral have no solution (residual {residual:.3e}); use quintics"
+    )]
+    QuarticInfeasible { residual: f64 },
+    /// The net is not a net of quads with curves along its edges.
+    #[error("net: {message}")]
+    Net { message: String },
+}
+
+/// What was built although the user should know something about it.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+#[expect(missing_docs, reason = "the messages spell out every field")]
+pub enum AsymptoticWarning {
+    /// `∫ |τ| ds` above 180 degrees.
+    #[error(
+        "{place}: the binormal turns by {degrees:.0} degrees (more than 180); check the end curvatures and tangents, or use the relaxed mode"
+    )]
+    BinormalTurning { place: Place, degrees: f64 },
+    /// `τ` passes zero.
+    #[error(
+        "{place}: torsion changes sign ({min:.3e} to {max:.3e}), so the Gaussian curvature vanishes on it: not a strict saddle"
+    )]
+    TorsionSignChange { place: Place, min: f64, max: f64 },
+    /// The corner torsions do not follow one pattern.
+    #[error(
+        "{place}: corner torsions of different sign ({values:?} for the curves in the u-direction); a strict saddle needs one sign"
+    )]
+    CornerTorsionSigns { place: Place, values: [f64; 4] },
+    /// Curvature almost zero somewhere.
+    #[error(
+        "{place}: curvature falls to {ratio:.4} of its maximum (below 0.02), a near-inflection; the tangent plane is badly determined there"
+    )]
+    NearZeroCurvature { place: Place, ratio: f64 },
+    /// `K > 0` inside.
+    #[error("{place}: Gaussian curvature is positive on {percent:.1} % of the patch")]
+    PositiveGauss { place: Place, percent: f64 },
+    /// The patch meets itself.
+    #[error("{place}: the patch intersects itself ({pairs} pairs of sampled triangles)")]
+    SelfIntersection { place: Place, pairs: usize },
+    /// Another choice of curvature signs turns much less.
+    #[error(
+        "{place}: with curvature signs {signs} the binormals turn by at most {best_degrees:.0} degrees instead of {degrees:.0}; check the signs"
+    )]
+    BetterBranch { place: Place, signs: String, best_degrees: f64, degrees: f64 },
+    /// Torsions of different sign at the two ends of a line.
+    #[error(
+        "{place}: the neighbours give the ends of this line torsions of opposite sign ({start:.3e}, {end:.3e}); the Gaussian curvature vanishes somewhere on it"
+    )]
+    LineTorsionSigns { place: Place, start: f64, end: f64 },
+    /// Nearly tangent parameter lines.
+    #[error("{place}: parameter lines meet at a sine of only {sine:.3}; raise the degree")]
+    LowSine { place: Place, sine: f64 },
+    /// The thin-plate optimum folded, so bounds were added.
+    #[error("{place}: transversality bounds were needed to keep the boundary from folding")]
+    BoundsActive { place: Place },
+    /// The degree asked for did not work and a higher one was taken.
+    #[error("{place}: bi-{from} was not regular, bi-{to} is used")]
+    DegreeRaised { place: Place, from: usize, to: usize },
+    /// Neighbouring normals far apart: the surface folds or has a singular point.
+    #[error(
+        "{place}: neighbouring normals turn by {degrees:.0} degrees, the patch is singular or folds there"
+    )]
+    NormalFlip { place: Place, degrees: f64 },
+    /// Odd interior valence.
+    #[error(
+        "{place}: interior vertex of odd valence {valence}; torsion and Gaussian curvature are zero there"
+    )]
+    OddValence { place: Place, valence: usize },
+    /// The torsion equation at a corner carries no unknown and is satisfied anyway.
+    #[error("{place}: the torsion equation is vacuous, one extra freedom is left to the energy")]
+    VacuousTorsion { place: Place },
+}
