@@ -95,6 +95,8 @@ pub struct Boundary {
     /// Vacuous equations, odd valences.
     pub warnings: Vec<AsymptoticWarning>,
     pub(crate) signs: Vec<[f64; 2]>,
+    /// Unit normal per vertex.
+    pub(crate) normals: Vec<DVec3>,
 }
 
 impl Boundary {
@@ -151,7 +153,15 @@ pub fn solve_boundary(
     let mut warnings = Vec::new();
     let signs = arm_signs(&net, &frames);
     pin_torsions(&net, &frames, &condensed, &mut bounds, &mut warnings)?;
-    let torsions = solve_torsions(&net, &signs, &condensed, &bounds);
+    let mut torsions = solve_torsions(&net, &signs, &condensed, &bounds);
+    // Where only lines meet no curve carries the torsion, but their patches still have one.
+    for (v, frame) in frames.iter().enumerate() {
+        let Some(frame) = frame else { continue };
+        if frame.arms.iter().all(|(i, _)| net.curves[*i].line) && bounds[v][0] < bounds[v][1] {
+            torsions[v] =
+                bilinear_torsion(&net, &signs, frame, v).clamp(bounds[v][0], bounds[v][1]);
+        }
+    }
     let free = bounds.iter().zip(&frames).filter(|(b, f)| f.is_some() && b[0] < b[1]).count();
 
     let curves: Vec<BezierCurve> = condensed
@@ -175,6 +185,7 @@ pub fn solve_boundary(
         freedoms: free + condensed.iter().map(|c| c.freedoms).sum::<usize>(),
         warnings,
         signs,
+        normals: frames.iter().map(|f| f.as_ref().map_or(DVec3::Z, |f| f.normal)).collect(),
     })
 }
 
@@ -367,6 +378,23 @@ fn pin_torsions(
         }
     }
     Ok(())
+}
+
+/// Torsion `N·R_uv / |R_u × R_v|` of the bilinear patches in the faces at `v`, averaged.
+fn bilinear_torsion(net: &AsymptoticNet, signs: &[[f64; 2]], frame: &VertexFrame, v: usize) -> f64 {
+    let (mut sum, mut count) = (0.0, 0.0);
+    for face in &net.faces {
+        let Some(c) = (0..4).find(|c| net.face_corner(face, *c) == v) else { continue };
+        let x: [DVec3; 4] = std::array::from_fn(|c| net.positions[net.face_corner(face, c)]);
+        let twist = x[3] - x[1] - x[2] + x[0];
+        let (along_u, along_v) = ([x[1] - x[0], x[3] - x[2]], [x[2] - x[0], x[3] - x[1]]);
+        let area = along_u[c / 2].cross(along_v[c % 2]).length();
+        let u_curve = 2 * (c / 2);
+        let end = usize::from((c % 2 == 1) != face.reversed[u_curve]);
+        sum += signs[face.curves[u_curve]][end] * frame.normal.dot(twist) / area;
+        count += 1.0;
+    }
+    if count > 0.0 { sum / count } else { 0.0 }
 }
 
 /// Minimises the sum of the condensed energies over the torsions within their bounds.

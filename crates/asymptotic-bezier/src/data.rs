@@ -278,7 +278,7 @@ impl AsymptoticNet {
         }
         // At the end the arm runs against the curve, so equal sides have opposite signs.
         let same_side = curve.curvatures[0] * curve.curvatures[1] < 0.0;
-        if !curve.line && same_side != (curve.inflections % 2 == 0) {
+        if !curve.line && same_side != curve.inflections.is_multiple_of(2) {
             return Err(AsymptoticError::InflectionParity { place, declared: curve.inflections });
         }
         Ok(())

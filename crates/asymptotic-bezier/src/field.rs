@@ -84,6 +84,15 @@ pub(crate) fn line_fields(n: usize) -> FieldSpace {
     FieldSpace { fields, normal: None }
 }
 
+/// The fields in the planes of a line and a direction field across it: `f e + g W`.
+pub(crate) fn ribbon_fields(curve: &BezierCurve, ribbon: &[DVec3; 4], n: usize) -> FieldSpace {
+    let points = curve.points();
+    let along = points[points.len() - 1] - points[0];
+    let mut fields: Vec<Vec<DVec3>> = (0..=n).map(|j| times_basis(n, j, &[along])).collect();
+    fields.extend((0..=n - 3).map(|j| times_basis(n - 3, j, ribbon)));
+    FieldSpace { fields, normal: Some(cross(&[along], ribbon)) }
+}
+
 /// The paper's own ansatz of degree `3p − 4`: `x` of degree `2p − 3`, `y` linear.
 ///
 /// With `free_alphas` false the coefficients of `x` besides the two at each end are zero, as the

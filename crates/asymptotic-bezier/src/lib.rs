@@ -9,10 +9,14 @@ mod dense;
 mod error;
 mod field;
 mod fill;
+mod gridshell;
+mod intersect;
+mod net;
 mod patch;
 mod quad;
 mod surface;
 mod torsion_qp;
+mod verify;
 mod vertex;
 
 pub use boundary::{
@@ -22,6 +26,8 @@ pub use curve::{BezierCurve, CurveJet, CurveQuality};
 pub use data::{AsymptoticNet, CornerData, Curvatures, DATA_DEGREE, NetCurve, NetFace};
 pub use error::{AsymptoticError, AsymptoticWarning, Place};
 pub use fill::MAX_SURFACE_DEGREE;
+pub use gridshell::{Gridshell, GridshellCheck, GridshellOptions, JoinCheck, fill_net};
 pub use patch::{Ansatz, FilledPatch, PatchBoundary, PatchOptions, fill_patch};
 pub use quad::{Quadrilateral, solve_quadrilateral};
 pub use surface::{Patch, PatchJet};
+pub use verify::PatchCheck;

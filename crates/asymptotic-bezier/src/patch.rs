@@ -8,7 +8,7 @@ use crate::bounds;
 use crate::curve::BezierCurve;
 use crate::dense::{Matrix, affine_space, axpy, dot, minimize_quadratic};
 use crate::error::{AsymptoticError, AsymptoticWarning, Place};
-use crate::field::{FieldSpace, line_fields, paper_ansatz, tangent_module};
+use crate::field::{FieldSpace, line_fields, paper_ansatz, ribbon_fields, tangent_module};
 use crate::fill::{MAX_SURFACE_DEGREE, fill_table};
 use crate::surface::Patch;
 
@@ -59,6 +59,9 @@ pub struct PatchBoundary {
     pub lines: [bool; 4],
     /// Parameters of their inflections.
     pub inflections: [Vec<f64>; 4],
+    /// Across a straight curve, a cubic direction field the tangent planes must contain; without
+    /// one they are free. Patches on both sides of a line share it, which makes the join G1.
+    pub ribbons: [Option<[DVec3; 4]>; 4],
 }
 
 /// A filled patch.
@@ -75,6 +78,9 @@ pub struct FilledPatch {
     /// Bounds that were needed, degrees that were raised.
     pub warnings: Vec<AsymptoticWarning>,
 }
+
+/// A sparse vector equation: coefficients by column, and the right side.
+type VectorEquation = (Vec<(usize, DVec3)>, DVec3);
 
 /// Curve and end at the corners `00`, `10`, `01`, `11`: the u-curve, then the v-curve.
 const CORNERS: [[(usize, usize); 2]; 4] =
@@ -210,7 +216,10 @@ impl PatchFamily {
         let spaces: [FieldSpace; 4] = std::array::from_fn(|i| {
             let curve = &boundary.curves[i];
             match ansatz {
-                _ if boundary.lines[i] => line_fields(n),
+                _ if boundary.lines[i] => match &boundary.ribbons[i] {
+                    Some(ribbon) => ribbon_fields(curve, ribbon, n),
+                    None => line_fields(n),
+                },
                 Ansatz::Module => tangent_module(curve, &boundary.inflections[i], n),
                 Ansatz::Paper => paper_ansatz(curve, false),
                 Ansatz::PaperFree => paper_ansatz(curve, true),
@@ -260,8 +269,7 @@ impl PatchFamily {
             .flat_map(|s| &s.fields)
             .map(|f| f.iter().map(|c| c.abs().max_element()).fold(0.0, f64::max).recip())
             .collect();
-        // Sparse vector equations: list of (column, coefficient) and a right side.
-        let mut equations: Vec<[(Vec<(usize, DVec3)>, DVec3); 3]> = Vec::with_capacity(4);
+        let mut equations: Vec<[VectorEquation; 3]> = Vec::with_capacity(4);
         for [(p, pe), (q, qe)] in CORNERS {
             let at = |e: usize, k: usize| if e == 0 { k } else { n - k };
             let (p0, p_columns) = self.second_row(p, at(pe, 0));

@@ -237,7 +237,7 @@ pub(crate) fn finish(
     }
     Ok(Quadrilateral {
         strain_energy: curves.iter().map(|c| c.derivative_energy(2)).sum(),
-        boundary: PatchBoundary { curves, lines: data.lines, inflections },
+        boundary: PatchBoundary { curves, lines: data.lines, inflections, ribbons: [None; 4] },
         torsions,
         curvatures,
         qualities,

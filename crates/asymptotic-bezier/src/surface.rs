@@ -194,6 +194,53 @@ impl Patch {
         }
     }
 
+    /// The jet at one parameter pair of two tables.
+    pub(crate) fn jet_at(
+        &self,
+        bu: &BasisTable,
+        iu: usize,
+        bv: &BasisTable,
+        iv: usize,
+        jet: &mut PatchJet,
+    ) {
+        let m = self.degree + 1;
+        *jet = PatchJet::default();
+        let (v0, v1, v2) = (bv.row(0, iv), bv.row(1, iv), bv.row(2, iv));
+        for i in 0..m {
+            let weights = [bu.row(0, iu)[i], bu.row(1, iu)[i], bu.row(2, iu)[i]];
+            // On the boundary most weights vanish.
+            if weights == [0.0; 3] {
+                continue;
+            }
+            let (mut r, mut rv, mut rvv) = (DVec3::ZERO, DVec3::ZERO, DVec3::ZERO);
+            for (j, point) in self.points[i * m..(i + 1) * m].iter().enumerate() {
+                r += *point * v0[j];
+                rv += *point * v1[j];
+                rvv += *point * v2[j];
+            }
+            jet.position += r * weights[0];
+            jet.u += r * weights[1];
+            jet.v += rv * weights[0];
+            jet.uu += r * weights[2];
+            jet.uv += rv * weights[1];
+            jet.vv += rvv * weights[0];
+        }
+    }
+
+    /// Appends the positions at parameter `iu` and all parameters of `table`.
+    pub(crate) fn positions_row(&self, table: &BasisTable, iu: usize, out: &mut Vec<DVec3>) {
+        let m = self.degree + 1;
+        let mut curve = [DVec3::ZERO; 16];
+        for (i, w) in table.row(0, iu).iter().enumerate() {
+            for (j, point) in self.points[i * m..(i + 1) * m].iter().enumerate() {
+                curve[j] += *point * *w;
+            }
+        }
+        for iv in 0..table.len() {
+            out.push(curve.iter().zip(table.row(0, iv)).map(|(c, b)| *c * *b).sum());
+        }
+    }
+
     /// Position at `(u, v)`.
     #[must_use]
     pub fn position(&self, u: f64, v: f64) -> DVec3 {

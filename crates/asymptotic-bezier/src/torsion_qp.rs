@@ -154,7 +154,9 @@ fn conjugate_gradients(
 mod tests {
     use super::*;
 
-    fn chain(n: usize) -> (Vec<f64>, Vec<(usize, usize, f64)>, Vec<f64>) {
+    type Problem = (Vec<f64>, Vec<(usize, usize, f64)>, Vec<f64>);
+
+    fn chain(n: usize) -> Problem {
         let diagonal = (0..n).map(|i| 3.0 + (i % 5) as f64).collect();
         let couplings = (1..n).map(|i| (i - 1, i, 1.0)).collect();
         let gradient = (0..n).map(|i| (i as f64 * 0.7).sin()).collect();
@@ -183,8 +185,8 @@ mod tests {
         }
         for v in 0..30 {
             match tau[v] {
-                t if t == -0.05 => assert!(slope[v] >= 0.0),
-                t if t == 0.1 => assert!(slope[v] <= 0.0),
+                -0.05 => assert!(slope[v] >= 0.0),
+                0.1 => assert!(slope[v] <= 0.0),
                 _ => assert!(slope[v].abs() < 1e-13),
             }
         }

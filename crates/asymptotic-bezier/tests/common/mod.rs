@@ -1,6 +1,7 @@
 //! The recorded reference data sets.
 
 #![allow(dead_code, reason = "each test file uses its share")]
+#![allow(clippy::unwrap_used, reason = "recorded data; a wrong file should stop the test")]
 
 use asymptotic_bezier::{CornerData, Curvatures};
 use geom_core::DVec3;
@@ -51,4 +52,106 @@ fn read_set(json: &Value) -> ReferenceSet {
         },
         json: json.clone(),
     }
+}
+
+/// Point of Enneper's surface in asymptotic parameters.
+pub(crate) fn enneper(p: f64, q: f64) -> DVec3 {
+    let (u, v) = (0.5 * (p + q), 0.5 * (p - q));
+    DVec3::new(u - u.powi(3) / 3.0 + u * v * v, v - v.powi(3) / 3.0 + v * u * u, u * u - v * v)
+}
+
+/// Point of the catenoid in asymptotic parameters.
+pub(crate) fn catenoid(p: f64, q: f64) -> DVec3 {
+    let (u, v) = (0.5 * (p + q), 0.5 * (p - q));
+    DVec3::new(u.cosh() * v.cos(), u.cosh() * v.sin(), u)
+}
+
+/// Quad mesh with `n × m` faces over `[p0, p1] × [q0, q1]`, oriented by `∂p × ∂q`.
+pub(crate) fn sampled_net(
+    surface: impl Fn(f64, f64) -> DVec3,
+    [p0, p1, q0, q1]: [f64; 4],
+    [n, m]: [usize; 2],
+) -> geom_core::PolyMesh {
+    let mut positions = Vec::new();
+    for i in 0..=n {
+        for j in 0..=m {
+            let (s, t) = (i as f64 / n as f64, j as f64 / m as f64);
+            positions.push(surface(p0 + (p1 - p0) * s, q0 + (q1 - q0) * t));
+        }
+    }
+    let at = |i: usize, j: usize| (i * (m + 1) + j) as u32;
+    let faces: Vec<[u32; 4]> = (0..n * m)
+        .map(|k| (k / m, k % m))
+        .map(|(i, j)| [at(i, j), at(i + 1, j), at(i + 1, j + 1), at(i, j + 1)])
+        .collect();
+    geom_core::PolyMesh::new(positions, &faces).unwrap()
+}
+
+/// First and second derivative of a curve at `t` by stencils of nine points.
+fn derivatives(f: impl Fn(f64) -> DVec3, t: f64) -> (DVec3, DVec3) {
+    let h = 0.02;
+    let at = |k: f64| (f(t + k * h), f(t - k * h));
+    let first = [4.0 / 5.0, -1.0 / 5.0, 4.0 / 105.0, -1.0 / 280.0];
+    let second = [8.0 / 5.0, -1.0 / 5.0, 8.0 / 315.0, -1.0 / 560.0];
+    let (mut d1, mut d2) = (DVec3::ZERO, f(t) * (-205.0 / 72.0));
+    for k in 0..4 {
+        let (a, b) = at(k as f64 + 1.0);
+        d1 += (a - b) * first[k];
+        d2 += (a + b) * second[k];
+    }
+    (d1 / h, d2 / (h * h))
+}
+
+/// The net over a grid of a surface in asymptotic parameters with exact tangents and curvatures.
+pub(crate) fn exact_net(
+    surface: impl Fn(f64, f64) -> DVec3 + Copy,
+    window: [f64; 4],
+    [n, m]: [usize; 2],
+) -> asymptotic_bezier::AsymptoticNet {
+    let [p0, p1, q0, q1] = window;
+    let at = |s: f64, t: f64| surface(p0 + (p1 - p0) * s, q0 + (q1 - q0) * t);
+    let mesh = sampled_net(surface, window, [n, m]);
+    let node = |i: usize, j: usize| (i as f64 / n as f64, j as f64 / m as f64);
+    let mut curves = Vec::new();
+    let mut add = |a: (usize, usize), b: (usize, usize)| {
+        let u = b.0 > a.0;
+        let step = if u { 1.0 / n as f64 } else { 1.0 / m as f64 };
+        let mut curve = asymptotic_bezier::NetCurve {
+            ends: [a.0 * (m + 1) + a.1, b.0 * (m + 1) + b.1],
+            arms: [DVec3::ZERO; 2],
+            curvatures: [0.0; 2],
+            line: false,
+            inflections: 0,
+        };
+        for (e, (i, j)) in [a, b].into_iter().enumerate() {
+            let (s, t) = node(i, j);
+            let (pu, _) = derivatives(|x| at(x, t), s);
+            let (pv, _) = derivatives(|x| at(s, x), t);
+            let normal = pu.cross(pv).normalize();
+            let (first, second) =
+                if u { derivatives(|x| at(x, t), s) } else { derivatives(|x| at(s, x), t) };
+            let sign = if e == 0 { 1.0 } else { -1.0 };
+            curve.arms[e] = first * (sign * step / 5.0);
+            curve.curvatures[e] = sign * first.cross(second).dot(normal) / first.length().powi(3);
+        }
+        curves.push(curve);
+    };
+    for i in 0..=n {
+        for j in 0..=m {
+            if i < n {
+                add((i, j), (i + 1, j));
+            }
+            if j < m {
+                add((i, j), (i, j + 1));
+            }
+        }
+    }
+    let quads: Vec<[usize; 4]> = mesh
+        .faces()
+        .map(|f| {
+            let corners: Vec<usize> = mesh.face_vertices(f).map(|v| v.index()).collect();
+            [corners[0], corners[1], corners[2], corners[3]]
+        })
+        .collect();
+    asymptotic_bezier::AsymptoticNet::new(mesh.positions().to_vec(), &quads, curves).unwrap()
 }

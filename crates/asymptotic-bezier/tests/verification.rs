@@ -1,0 +1,132 @@
+//! What verification says of good data, bad data, and nets.
+
+mod common;
+
+use asymptotic_bezier::{
+    AsymptoticNet, AsymptoticWarning, BoundaryOptions, GridshellOptions, PatchCheck, PatchOptions,
+    Place, fill_net, fill_patch, solve_quadrilateral,
+};
+use common::{catenoid, enneper, exact_net, reference_set, sampled_net};
+
+#[test]
+fn good_sets_have_asymptotic_boundaries_and_no_warnings() {
+    for name in ["A", "B", "C", "Eplus", "G", "H"] {
+        let set = reference_set(name);
+        let quad = solve_quadrilateral(&set.data, &BoundaryOptions::default()).unwrap();
+        let filled = fill_patch(&quad.boundary, &PatchOptions::default(), Place::Patch(0)).unwrap();
+        let check = PatchCheck::new(&filled.patch, &quad.boundary);
+        println!("{name} {check:?} {:?}", quad.warnings);
+        assert!(check.normal_curvature <= 1e-10, "{name}: {:e}", check.normal_curvature);
+        assert!(check.torsion_defect <= 1e-8, "{name}: {:e}", check.torsion_defect);
+        assert!(check.sine > 0.4, "{name}: {}", check.sine);
+        assert_eq!(check.self_intersections, 0);
+        assert_eq!(check.positive_gauss, 0.0);
+        assert!(check.warnings(Place::Patch(0), 0.1).is_empty());
+    }
+}
+
+#[test]
+fn hand_made_and_random_sets_are_warned_about() {
+    for name in ["D", "E_", "F"] {
+        let set = reference_set(name);
+        let quad = solve_quadrilateral(&set.data, &BoundaryOptions::default()).unwrap();
+        let turning =
+            |w: &AsymptoticWarning| matches!(w, AsymptoticWarning::BinormalTurning { .. });
+        assert!(quad.warnings.iter().any(turning), "{name}");
+        let branch = |w: &AsymptoticWarning| matches!(w, AsymptoticWarning::BetterBranch { .. });
+        println!("{name} {:?}", quad.warnings);
+        if name == "E_" {
+            assert!(quad.warnings.iter().any(branch));
+        }
+        let options = PatchOptions { degree: Some(7), ..Default::default() };
+        let filled = fill_patch(&quad.boundary, &options, Place::Patch(0)).unwrap();
+        let check = PatchCheck::new(&filled.patch, &quad.boundary);
+        println!("{name} energy {} {check:?}", filled.thin_plate_energy);
+        let warnings = check.warnings(Place::Patch(0), 0.1);
+        let crossing =
+            |w: &AsymptoticWarning| matches!(w, AsymptoticWarning::SelfIntersection { .. });
+        assert!(warnings.iter().any(crossing), "{name}");
+    }
+}
+
+#[test]
+fn transversality_bounds_reproduce_the_recorded_energies() {
+    for (name, degree, want) in [("D", 7, 209.15), ("E_", 7, 359.28), ("C", 6, 40.889)] {
+        let set = reference_set(name);
+        let quad = solve_quadrilateral(&set.data, &BoundaryOptions::default()).unwrap();
+        let options = PatchOptions { degree: Some(degree), ..Default::default() };
+        let filled = fill_patch(&quad.boundary, &options, Place::Patch(0)).unwrap();
+        let energy = filled.thin_plate_energy;
+        assert!((energy - want).abs() < 1e-4 * want, "{name}: {energy} against {want}");
+        assert!(filled.transversality >= 0.25 - 1e-8);
+    }
+}
+
+#[test]
+fn nets_of_minimal_surfaces_join_without_kinks() {
+    let window = [-0.6, 0.9, 0.2, 1.3];
+    let sampled = |mesh| AsymptoticNet::from_mesh(&mesh).unwrap();
+    let cases: [(&str, AsymptoticNet); 6] = [
+        ("Enneper 2x2", exact_net(enneper, window, [2, 2])),
+        ("Enneper 3x3", exact_net(enneper, window, [3, 3])),
+        ("catenoid 2x2", exact_net(catenoid, [0.2, 1.4, -0.1, 0.9], [2, 2])),
+        ("Enneper 3x3 from its vertices", sampled(sampled_net(enneper, window, [3, 3]))),
+        ("Enneper 30x30", sampled(sampled_net(enneper, window, [30, 30]))),
+        ("catenoid 8x8", sampled(sampled_net(catenoid, [0.5, 1.5, 0.1, 0.9], [8, 8]))),
+    ];
+    for (name, net) in cases {
+        let options = GridshellOptions::default();
+        let start = std::time::Instant::now();
+        let shell = fill_net(&net, &options).unwrap();
+        let solved = start.elapsed();
+        let check = shell.verify(&net, &options.patch);
+        let verified = start.elapsed() - solved;
+        let least = check.patches.iter().map(|p| p.sine).fold(1.0, f64::min);
+        let gauss = check.joins.iter().map(|j| j.gaussian_jump).fold(0.0, f64::max);
+        let mean = check.joins.iter().map(|j| j.mean_jump).fold(0.0, f64::max);
+        let kink = check.kink().to_degrees();
+        println!(
+            "{name}: kink {kink:e} deg, dK {gauss:e}, dH {mean:e}, sine {least}, {} warnings, {solved:?} {verified:?}",
+            check.warnings.len()
+        );
+        println!("{:?}", check.warnings.first());
+        assert!(kink <= 1e-8 && gauss < 1e-6 && least > 0.5, "{name}");
+        let normal = check.patches.iter().map(|p| p.normal_curvature).fold(0.0, f64::max);
+        let defect = check.patches.iter().map(|p| p.torsion_defect).fold(0.0, f64::max);
+        println!("{name}: normal curvature {normal:e}, torsion defect {defect:e}");
+        assert!(normal <= 1e-10, "{name}: {normal:e}");
+        // Of patches thirty to a side the second derivatives have fewer digits.
+        assert!(defect <= if name.contains("30x30") { 1e-7 } else { 1e-8 }, "{name}: {defect:e}");
+    }
+}
+
+#[test]
+fn four_straight_lines_give_the_bilinear_patch_or_a_plane() {
+    let v = geom_core::DVec3::new;
+    for (z, plane) in [(0.6, false), (0.0, true)] {
+        let corners = [v(-1., -1., z), v(1., -1., -z), v(-1.2, 1., -z), v(1.3, 1.1, z)];
+        let ends = [[0, 1], [0, 2], [2, 3], [1, 3]];
+        let along = |i: usize, t: f64| {
+            let [a, b]: [usize; 2] = ends[i];
+            corners[a].lerp(corners[b], t)
+        };
+        let data = asymptotic_bezier::CornerData {
+            corners,
+            start_points: std::array::from_fn(|i| along(i, 0.2)),
+            end_points: std::array::from_fn(|i| along(i, 0.8)),
+            curvatures: asymptotic_bezier::Curvatures::Signed([[0.0; 2]; 4]),
+            lines: [true; 4],
+            inflections: [0; 4],
+        };
+        let quad = solve_quadrilateral(&data, &BoundaryOptions::default()).unwrap();
+        assert!(quad.strain_energy < 1e-20 && quad.warnings.is_empty(), "{:?}", quad.warnings);
+        let filled = fill_patch(&quad.boundary, &PatchOptions::default(), Place::Patch(0)).unwrap();
+        for k in 0..=100 {
+            let (s, t) = (f64::from(k % 10) / 9.0, f64::from(k / 10) / 10.0);
+            let want = corners[0].lerp(corners[1], s).lerp(corners[2].lerp(corners[3], s), t);
+            let error = (filled.patch.position(s, t) - want).length();
+            assert!(error < 1e-12, "{error:e} at {s} {t}");
+            assert!(!plane || filled.patch.position(s, t).z.abs() < 1e-13);
+        }
+    }
+}
