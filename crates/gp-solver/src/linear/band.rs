@@ -1,19 +1,51 @@
 //! Our band Cholesky factorisation.
 
+use rayon::prelude::*;
+
+use super::band_kernel::{
+    BackwardGroup, FactorDiagonal, ForwardGroup, Layout, UpdateGroups, group_rows,
+};
 use crate::error::SolverError;
+
+/// Panels with at least this many multiplications are split over the threads.
+const PARALLEL_WORK: usize = 200_000;
 
 /// Cholesky factorisation `A = L Lᵀ` of a band matrix.
 ///
-/// Storage is by columns: entry `(i, j)` with `j ≤ i ≤ j + half_bandwidth` stands at
-/// [`slot(i, j)`](Self::slot)` = j · stride + i`, so that going down a column and going along a
-/// row of the band are both unit or constant steps. A dense matrix is one with
-/// `half_bandwidth = size − 1`.
+/// A matrix is given by columns: entry `(i, j)` with `j ≤ i ≤ j + half_bandwidth` stands at
+/// [`slot(i, j)`](Self::slot), one step down a column being one step in memory. A dense matrix is
+/// one with `half_bandwidth = size − 1`.
+///
+/// The factor is kept in groups of rows, each group contiguous and by columns, so that every
+/// inner product streams through memory and fills the vector registers: a left-looking method
+/// whose tiles of three vectors by four or eight columns never leave the registers.
+/// The result is the same bit for bit whatever the number of threads.
+///
+/// ```
+/// use gp_solver::BandCholesky;
+/// let mut cholesky = BandCholesky::new(3, 1);
+/// let mut values = vec![0.0; cholesky.values_len()];
+/// for i in 0..3 {
+///     values[cholesky.slot(i, i)] = 2.0;
+///     if i > 0 {
+///         values[cholesky.slot(i, i - 1)] = -1.0;
+///     }
+/// }
+/// cholesky.factor(&values, &[0.0; 3])?;
+/// let mut x = [1.0, 0.0, 1.0];
+/// cholesky.solve_in_place(&mut x);
+/// assert!(x.iter().all(|v| (v - 1.0).abs() < 1e-15));
+/// # Ok::<(), gp_solver::SolverError>(())
+/// ```
 #[derive(Clone, Debug)]
 pub struct BandCholesky {
     size: usize,
     half_bandwidth: usize,
-    stride: usize,
+    layout: Layout,
+    /// The groups of the factor, from [`begin`](Self::begin) on.
     factor: Vec<f64>,
+    /// Where the factor begins, so that its vectors do not straddle cache lines.
+    begin: usize,
 }
 
 impl BandCholesky {
@@ -21,8 +53,8 @@ impl BandCholesky {
     #[must_use]
     pub fn new(size: usize, half_bandwidth: usize) -> Self {
         let half_bandwidth = half_bandwidth.min(size.saturating_sub(1));
-        let stride = half_bandwidth.next_multiple_of(8).max(8);
-        Self { size, half_bandwidth, stride, factor: Vec::new() }
+        let layout = Layout::new(size, half_bandwidth, group_rows());
+        Self { size, half_bandwidth, layout, factor: Vec::new(), begin: 0 }
     }
 
     /// Number of rows.
@@ -40,13 +72,13 @@ impl BandCholesky {
     /// Length of the values of a matrix.
     #[must_use]
     pub fn values_len(&self) -> usize {
-        (self.stride + 1) * self.size
+        (self.half_bandwidth + 1) * self.size
     }
 
-    /// Where entry `(i, j)`, `i ≥ j`, stands.
+    /// Where entry `(i, j)`, `i ≥ j`, stands: at `j · half_bandwidth + i`.
     #[must_use]
     pub fn slot(&self, i: usize, j: usize) -> usize {
-        j * self.stride + i
+        j * self.half_bandwidth + i
     }
 
     /// Factors `A + diag(shift)`; `values` is laid out as [`slot`](Self::slot) says.
@@ -59,30 +91,36 @@ impl BandCholesky {
     pub fn factor(&mut self, values: &[f64], shift: &[f64]) -> Result<(), SolverError> {
         assert_eq!(values.len(), self.values_len(), "values in band storage");
         assert_eq!(shift.len(), self.size, "one shift per row");
-        self.factor.clear();
-        self.factor.extend_from_slice(values);
-        let (n, kd, stride) = (self.size, self.half_bandwidth, self.stride);
-        for j in 0..n {
-            let l = &mut self.factor;
-            l[j * stride + j] += shift[j];
-            let end = n.min(j + kd + 1);
-            for k in j.saturating_sub(kd)..j {
-                let y = l[k * stride + j];
-                let last = n.min(k + kd + 1).min(end);
-                let (left, right) = l.split_at_mut(j * stride + j);
-                let from = &left[k * stride + j..k * stride + last];
-                for (t, &s) in right[..last - j].iter_mut().zip(from) {
-                    *t -= y * s;
-                }
+        let layout = self.layout;
+        if self.factor.is_empty() {
+            self.factor = vec![0.0; layout.groups() * layout.group_len() + 8];
+            self.begin = self.factor.as_ptr().align_offset(64).min(8);
+        }
+        let arch = pulp::Arch::new();
+        let threads = rayon::current_num_threads();
+        let all = &mut self.factor[self.begin..];
+        for panel in 0..layout.groups() {
+            let (done, rest) = all.split_at_mut((panel + 1) * layout.group_len());
+            let group = &mut done[panel * layout.group_len()..];
+            let pivots = FactorDiagonal { layout, values, shift, panel, group: &mut *group };
+            if let Err(variable) = arch.dispatch(pivots) {
+                return Err(SolverError::NotPositiveDefinite { variable });
             }
-            let pivot = l[j * stride + j];
-            if !(pivot > 0.0 && pivot.is_finite()) {
-                return Err(SolverError::NotPositiveDefinite { variable: j });
-            }
-            let root = pivot.sqrt();
-            l[j * stride + j] = root;
-            for t in &mut l[j * stride + j + 1..j * stride + end] {
-                *t /= root;
+            let below = layout.groups_below(panel);
+            let rest = &mut rest[..below * layout.group_len()];
+            let group = &*group;
+            let update = |first: usize, groups: &mut [f64]| {
+                arch.dispatch(UpdateGroups { layout, values, panel, first, group, groups });
+            };
+            let work = below * layout.rows * self.half_bandwidth / 2 * layout.rows;
+            if threads > 1 && work >= PARALLEL_WORK {
+                // Every group of rows is its own computation, so the split changes no bit.
+                let share = below.div_ceil(2 * threads);
+                rest.par_chunks_mut(share * layout.group_len())
+                    .enumerate()
+                    .for_each(|(k, groups)| update(panel + 1 + k * share, groups));
+            } else {
+                update(panel + 1, rest);
             }
         }
         Ok(())
@@ -94,22 +132,21 @@ impl BandCholesky {
     /// If `rhs` has the wrong length or nothing was factored.
     pub fn solve_in_place(&self, rhs: &mut [f64]) {
         assert_eq!(rhs.len(), self.size, "one value per row");
-        assert_eq!(self.factor.len(), self.values_len(), "factor a matrix first");
-        let (n, kd, stride) = (self.size, self.half_bandwidth, self.stride);
-        for j in 0..n {
-            let end = n.min(j + kd + 1);
-            let column = &self.factor[j * stride + j..j * stride + end];
-            let x = rhs[j] / column[0];
-            rhs[j] = x;
-            for (t, &l) in rhs[j + 1..end].iter_mut().zip(&column[1..]) {
-                *t -= l * x;
-            }
+        assert!(self.size == 0 || !self.factor.is_empty(), "factor a matrix first");
+        let layout = self.layout;
+        let arch = pulp::Arch::new();
+        let mut x = vec![0.0; layout.groups() * layout.rows];
+        x[..self.size].copy_from_slice(rhs);
+        let group = |k: usize| {
+            let start = self.begin + k * layout.group_len();
+            &self.factor[start..start + layout.group_len()]
+        };
+        for k in 0..layout.groups() {
+            arch.dispatch(ForwardGroup { layout, index: k, group: group(k), x: &mut x });
         }
-        for j in (0..n).rev() {
-            let end = n.min(j + kd + 1);
-            let column = &self.factor[j * stride + j..j * stride + end];
-            let sum: f64 = rhs[j + 1..end].iter().zip(&column[1..]).map(|(&x, &l)| x * l).sum();
-            rhs[j] = (rhs[j] - sum) / column[0];
+        for k in (0..layout.groups()).rev() {
+            arch.dispatch(BackwardGroup { layout, index: k, group: group(k), x: &mut x });
         }
+        rhs.copy_from_slice(&x[..self.size]);
     }
 }

@@ -1,6 +1,7 @@
 //! Factorisations of symmetric positive definite matrices, chosen by structure.
 
 mod band;
+mod band_kernel;
 mod factor;
 mod ordering;
 mod pattern;

@@ -125,6 +125,11 @@ impl SparseCholesky {
             )
             .err();
         if let Some(LltError::NonPositivePivot { index }) = failed {
+            // faer 0.24 counts from one in its simplicial code and from zero in the supernodal.
+            let index = match symbolic.raw() {
+                SymbolicCholeskyRaw::Simplicial(_) => index.saturating_sub(1),
+                SymbolicCholeskyRaw::Supernodal(_) => index,
+            };
             let variable = symbolic.perm().map_or(index, |perm| perm.arrays().0[index]);
             return Err(SolverError::NotPositiveDefinite { variable });
         }
