@@ -155,3 +155,44 @@ pub(crate) fn exact_net(
         .collect();
     asymptotic_bezier::AsymptoticNet::new(mesh.positions().to_vec(), &quads, curves).unwrap()
 }
+
+/// Reproducible standard normal numbers.
+pub(crate) struct Gauss(u64);
+
+impl Gauss {
+    pub(crate) fn new(seed: u64) -> Self {
+        Self(seed.wrapping_mul(0x9e37_79b9_7f4a_7c15) ^ 0x1234_5678_9abc_def1)
+    }
+
+    fn uniform(&mut self) -> f64 {
+        // SplitMix64.
+        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
+        let mut z = self.0;
+        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+        ((z ^ (z >> 31)) >> 11) as f64 / (1u64 << 53) as f64
+    }
+
+    pub(crate) fn next(&mut self) -> f64 {
+        let (u, v) = (1.0 - self.uniform(), self.uniform());
+        (-2.0 * u.ln()).sqrt() * (std::f64::consts::TAU * v).cos()
+    }
+}
+
+/// `data` with Gaussian noise: `sigma · |t|` per tangent component, relative for curvatures.
+pub(crate) fn noisy(data: &CornerData, sigma: f64, seed: u64) -> CornerData {
+    let mut gauss = Gauss::new(seed);
+    let mut out = data.clone();
+    let mut k = *data.curvatures.values();
+    for i in 0..4 {
+        for e in 0..2 {
+            let size = sigma * data.arm(i, e).length();
+            let noise = DVec3::new(gauss.next(), gauss.next(), gauss.next()) * size;
+            let tip = if e == 0 { &mut out.start_points[i] } else { &mut out.end_points[i] };
+            *tip += noise;
+            k[i][e] *= 1.0 + sigma * gauss.next();
+        }
+    }
+    out.curvatures = Curvatures::Signed(k);
+    out
+}
