@@ -60,7 +60,6 @@ impl Outcome {
         self
     }
 
-    #[allow(dead_code, reason = "used by the commands that measure")]
     /// Sets the `metrics` object from a struct with documented field names.
     pub(crate) fn with_metrics<T: Serialize>(mut self, metrics: &T) -> Result<Self, Failure> {
         self.metrics = serde_json::to_value(metrics).map_err(Failure::other)?;

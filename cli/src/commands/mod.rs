@@ -5,6 +5,7 @@
 //! the two lists below. `run` first checks its output paths, then reads, computes, and returns all
 //! files as bytes: `main` writes them together with the metrics and prints the summary.
 
+mod analyze;
 mod convert;
 
 use crate::context::Context;
@@ -37,6 +38,8 @@ macro_rules! commands {
 }
 
 commands! {
+    /// Measure size and curvatures of surfaces and meshes
+    analyze::Analyze,
     /// Change the format of surfaces, meshes, curves and points
     convert::Convert,
 }

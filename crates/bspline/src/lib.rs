@@ -11,6 +11,7 @@ mod fit;
 mod knots;
 mod rational;
 mod refine;
+mod statistics;
 mod surface;
 mod table;
 

@@ -6,10 +6,12 @@
 mod bounding_box;
 mod close;
 mod curvature_derivatives;
+mod curvature_statistics;
 mod forms;
 mod isolines;
 mod jet;
 mod least_squares;
+mod mesh_curvature;
 mod poly_mesh;
 mod third_order;
 mod tri_mesh;
@@ -17,6 +19,7 @@ mod tri_mesh;
 pub use bounding_box::BoundingBox;
 pub use close::assert_close;
 pub use curvature_derivatives::CurvatureDerivatives;
+pub use curvature_statistics::{CurvatureStatistics, ValueRange};
 pub use forms::{
     CurvatureError, FirstForm, PrincipalCurvatures, SINGULAR_RATIO, SecondForm,
     asymptotic_directions, gaussian_curvature, gradient_norm_squared, mean_curvature,
@@ -26,6 +29,7 @@ pub use glam::{DMat3, DVec2, DVec3};
 pub use isolines::{Isoline, isolines};
 pub use jet::SurfaceJet;
 pub use least_squares::{RANK_RATIO, RankError, least_squares};
+pub use mesh_curvature::{VertexCurvature, mesh_curvature_statistics, vertex_curvatures};
 pub use poly_mesh::{FaceId, HalfEdgeId, MeshError, PolyMesh, VertexId};
 pub use third_order::{ThirdOrder, UmbilicKind};
 pub use tri_mesh::{ClosestPoint, Foot, Nearest, TriMesh, closest_barycentric, closest_on_segment};
