@@ -65,11 +65,6 @@ pub enum NetError {
         "edges run {mean_deg:.1} degrees off the asymptotic directions in the mean and at most {limit_deg:.0} are allowed; remesh along the asymptotic directions"
     )]
     Misaligned { mean_deg: f64, limit_deg: f64 },
-    /// A face with all corners in a plane, as far as numbers tell.
-    #[error(
-        "face {face} is planar (height {height:e} of its size); a ruled patch needs a skew quad: remesh there, where the surface is flat, with larger faces"
-    )]
-    PlanarFace { face: usize, height: f64 },
     /// Arrays of a net whose lengths do not match its mesh.
     #[error("{what}: {found} values for {needed}; give one for each")]
     WrongCount { what: &'static str, found: usize, needed: usize },

@@ -4,10 +4,12 @@ use crate::blocks::{Combinations, Proximity, Target, Weight, Weighted, second_di
 use crate::boundary::{Boundary, targets};
 use crate::descend::{Damping, Descent, StepRecord};
 use crate::lelieuvre::{LelieuvreStart, NORMAL, POSITION, constraints, shape_parameters};
-use crate::polish::Polish;
 use crate::{HyperbolicNet, NetError, QuadNet, best_log_factor};
 use geom_core::{ClosestPoint, DVec3};
-use gp_solver::{Factorization, Problem, SolverError, Status, System};
+use gp_solver::{
+    Factorization, MinNormProjection, Problem, ProjectionOptions, QuadraticConstraints,
+    SolverError, Status, System,
+};
 use std::ops::ControlFlow;
 
 /// Settings of [`solve_joint`]. Lengths are counted in mean edge lengths and normals in their mean
@@ -77,9 +79,9 @@ pub struct NetReport {
     pub iterations: usize,
     /// Every Gauss-Newton step.
     pub history: Vec<StepRecord>,
-    /// Largest violation of the constraints before every polishing step and at the end, in mean
-    /// edge lengths; empty for methods without constraints.
-    pub constraint_max: Vec<f64>,
+    /// Largest violation of the constraints before the polishing and at the end, in mean edge
+    /// lengths; `None` without a polishing.
+    pub constraint_max: Option<[f64; 2]>,
     /// Edges of the input that twist against their family.
     pub wrong_twists: usize,
 }
@@ -137,27 +139,34 @@ pub fn solve_joint(
         }
     }
     drop(system);
-    let mut sizes = vec![h * h; 6 * vertices];
+    let mut scale = vec![size; 6 * vertices];
     for v in 0..vertices {
-        sizes[6 * v..6 * v + 3].fill(if fixed[v] { 0.0 } else { h * h });
-        sizes[6 * v + 3..6 * v + 6].fill(size * size);
+        scale[6 * v..6 * v + 3].fill(if fixed[v] { 0.0 } else { h });
     }
-    let constraint_max = if interrupted {
-        Vec::new()
-    } else {
-        polish(&constraint_block, sizes, &mut x, options).map_err(linear)?
-    };
-    let status = match constraint_max.last() {
-        None => Status::Interrupted,
-        Some(&last) if last <= options.polish_tol => Status::Converged,
-        Some(_) => Status::Stalled,
-    };
+    let (mut status, mut constraint_max, mut polish_steps) = (Status::Interrupted, None, 0);
+    if !interrupted {
+        // Aimed below what counts as exact; round-off may end it before that.
+        let polish_options = ProjectionOptions {
+            shift: POLISH_SHIFT,
+            tolerance: 0.1 * options.polish_tol,
+            max_iterations: options.polish_steps,
+        };
+        let mut projection =
+            MinNormProjection::new(&constraint_block, 6 * vertices).map_err(linear)?;
+        let report = projection
+            .project(&constraint_block, &mut x, &scale, &polish_options)
+            .map_err(linear)?;
+        let exact = report.final_violation <= options.polish_tol;
+        status = if exact { Status::Converged } else { Status::Stalled };
+        constraint_max = Some([report.initial_violation, report.final_violation]);
+        polish_steps = report.iterations;
+    }
     let positions: Vec<DVec3> = (0..vertices).map(|v| POSITION.get(&x, v)).collect();
     let mut normals: Vec<DVec3> = (0..vertices).map(|v| NORMAL.get(&x, v)).collect();
     let net = net.clone().with_positions(&positions);
     balance(&net, &mut normals);
     let shape = shape_parameters(&net, &normals);
-    let iterations = history.len() + constraint_max.len().saturating_sub(1);
+    let iterations = history.len() + polish_steps;
     let report =
         NetReport { status, iterations, history, constraint_max, wrong_twists: start.wrong };
     Ok((HyperbolicNet::new(net, Some(normals), shape)?, report))
@@ -167,7 +176,7 @@ fn problem<'a>(
     net: &QuadNet,
     reference: &'a dyn ClosestPoint,
     options: &JointOptions,
-    constraints: &gp_solver::QuadraticConstraints,
+    constraints: &QuadraticConstraints,
     [h, size]: [f64; 2],
     [constraint_weight, fairness_weight]: &[Weight; 2],
     fixed: &[bool],
@@ -226,32 +235,9 @@ fn problem<'a>(
     problem
 }
 
-/// Newton steps onto the constraints; the largest violation before each and at the end.
-fn polish(
-    block: &gp_solver::QuadraticConstraints,
-    sizes: Vec<f64>,
-    x: &mut [f64],
-    options: &JointOptions,
-) -> Result<Vec<f64>, SolverError> {
-    let mut polish = Polish::new(block, sizes)?;
-    let mut violations = vec![polish.residual_max(x)];
-    for _ in 0..options.polish_steps {
-        let last = violations[violations.len() - 1];
-        // Round-off of an edge vector sets the floor, about 1e-15 mean edge lengths.
-        if !(last > 0.02 * options.polish_tol) {
-            break;
-        }
-        let before = x.to_vec();
-        polish.step(x)?;
-        let after = polish.residual_max(x);
-        if !(after < last) {
-            x.copy_from_slice(&before);
-            break;
-        }
-        violations.push(after);
-    }
-    Ok(violations)
-}
+/// Shift of `J S Sᵀ Jᵀ` relative to its diagonal. Its rows depend on one another, since a net has
+/// an equation too many for every face.
+const POLISH_SHIFT: f64 = 1e-9;
 
 /// Uses the freedom that a 2-colouring leaves, `ν → t ν` at one colour and `ν / t` at the other, to
 /// bring the shape parameters nearest to 1 (Shi et al. 2014, Eq. 11). Edges do not change.

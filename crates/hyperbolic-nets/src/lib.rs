@@ -1,23 +1,26 @@
 //! Smooth skins of rational bilinear patches on asymptotic nets, and their Darboux transforms.
 
+mod asymptotic_field;
 mod blocks;
 mod boundary;
 mod descend;
 mod error;
+mod gates;
 mod hyperbolic_net;
 mod join;
 mod joint;
 mod lelieuvre;
 mod net;
 mod patch;
-mod polish;
 mod published;
 mod quad_distance;
 mod shape;
 
+pub use asymptotic_field::AsymptoticField;
 pub use boundary::Boundary;
 pub use descend::StepRecord;
 pub use error::{NetError, PatchError};
+pub use gates::{GateReport, NetWarning, inspect};
 pub use hyperbolic_net::{HyperbolicNet, KINK_SAMPLES, KinkStatistics, distances, star_planarity};
 pub use join::EdgeJoin;
 pub use joint::{JointOptions, NetReport, solve_joint};

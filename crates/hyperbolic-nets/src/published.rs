@@ -155,8 +155,7 @@ pub fn solve_published(
     }
     let net = net.clone().with_positions(&positions(&x));
     let iterations = history.len();
-    let report =
-        NetReport { status, iterations, history, constraint_max: Vec::new(), wrong_twists };
+    let report = NetReport { status, iterations, history, constraint_max: None, wrong_twists };
     Ok((HyperbolicNet::new(net, None, shape)?, report))
 }
 

@@ -1,0 +1,247 @@
+//! What to know about an input net before it is solved.
+
+use crate::lelieuvre::signs;
+use crate::{AsymptoticField, NetError, QuadNet};
+
+/// Share of negatively curved area below which a net is refused, and below which it is warned of.
+const NEGATIVE_SHARE: [f64; 2] = [0.60, 0.95];
+/// Mean misalignment in degrees above which a net is refused, and above which it is warned of.
+const MISALIGNMENT_DEG: [f64; 2] = [20.0, 12.0];
+/// Share of wrongly twisted edges above which a net is taken for one along curvature lines.
+const WRONG_TWISTS: f64 = 0.25;
+/// Height of the control tetrahedron over its edges below which a face counts as planar.
+const PLANAR_RATIO: f64 = 1e-9;
+
+/// Measures of an input net.
+#[derive(Clone, Debug, PartialEq)]
+pub struct GateReport {
+    /// Share of the reference surface with negative Gaussian curvature, 0 to 1.
+    pub negative_share: f64,
+    /// Mean angle between edges and asymptotic directions, in radians; 0 where there are none.
+    pub misalignment: f64,
+    /// Edges that twist against their family.
+    pub wrong_twists: usize,
+    /// Number of edges.
+    pub edges: usize,
+    /// Inner edges at which the net folds back.
+    pub folds: usize,
+    /// Faces with all corners in a plane.
+    pub planar_faces: Vec<usize>,
+    /// Whether the vertices can be coloured alternately.
+    pub two_colourable: bool,
+}
+
+/// What is unusual about an input without making it unusable.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+#[expect(missing_docs, reason = "the messages spell out every field")]
+pub enum NetWarning {
+    /// Some of the surface is not negatively curved.
+    #[error(
+        "{percent:.0} % of the surface is not negatively curved; the net will leave the surface there, trim it away if that is too far"
+    )]
+    NotEverywhereNegative { percent: f64 },
+    /// Edges stray from the asymptotic directions.
+    #[error(
+        "edges run {mean_deg:.1} degrees off the asymptotic directions in the mean; remesh along these if the result moves too far"
+    )]
+    Misaligned { mean_deg: f64 },
+    /// Some edges twist the wrong way.
+    #[error(
+        "{wrong} of {edges} edges twist against their family; look for folded or very flat faces and remesh there"
+    )]
+    WrongTwists { wrong: usize, edges: usize },
+    /// The net folds back.
+    #[error(
+        "the input folds back at {edges} edges; untangle or remesh these faces if the result does so too"
+    )]
+    Folds { edges: usize },
+    /// Faces without twist.
+    #[error(
+        "{count} faces are planar (first: {first}); the surface is flat there and the net may lose its shape: use larger faces there"
+    )]
+    PlanarFaces { count: usize, first: usize },
+    /// No alternating colouring.
+    #[error(
+        "vertices cannot be coloured alternately around some hole (an odd number of edges leads around it): the shape parameters are unique and no common factor can be chosen"
+    )]
+    NotTwoColourable,
+}
+
+/// Measures a net; `field` belongs to its reference surface.
+#[must_use]
+pub fn inspect(net: &QuadNet, field: &AsymptoticField<'_>) -> GateReport {
+    let positions = net.positions();
+    let angles: Vec<f64> = net
+        .edges()
+        .iter()
+        .filter_map(|e| {
+            let [a, b] = e.ends.map(|v| positions[v]);
+            field.misalignment((a + b) / 2.0, b - a)
+        })
+        .collect();
+    let normals = net.vertex_normals(positions);
+    let (_, wrong_twists) = signs(net, positions, &normals);
+    let planar = |q: &[u32; 4]| {
+        let [a, b, c, d] = q.map(|v| positions[v as usize]);
+        let volume = (b - a).cross(d - a).dot(c - a).abs();
+        let longest =
+            [b - a, c - b, d - c, a - d].map(|e| e.length()).into_iter().fold(0.0, f64::max);
+        volume <= PLANAR_RATIO * longest.powi(3)
+    };
+    GateReport {
+        negative_share: field.negative_share(),
+        misalignment: angles.iter().sum::<f64>() / angles.len().max(1) as f64,
+        wrong_twists,
+        edges: net.edges().len(),
+        folds: net.inner_edges().iter().filter(|e| net.join(e, positions).is_folded()).count(),
+        planar_faces: (0..net.quads().len()).filter(|&f| planar(&net.quads()[f])).collect(),
+        two_colourable: net.colours().is_some(),
+    }
+}
+
+impl GateReport {
+    /// Warnings for what is unusual.
+    ///
+    /// # Errors
+    /// [`NetError::CurvatureAligned`], [`NetError::NotNegativelyCurved`] or
+    /// [`NetError::Misaligned`] for nets that no solver here can make smooth.
+    pub fn check(&self) -> Result<Vec<NetWarning>, NetError> {
+        let (wrong, edges) = (self.wrong_twists, self.edges);
+        let percent = 100.0 * self.negative_share;
+        if self.negative_share < NEGATIVE_SHARE[0] {
+            return Err(NetError::NotNegativelyCurved {
+                percent,
+                needed: 100.0 * NEGATIVE_SHARE[0],
+            });
+        }
+        if wrong as f64 > WRONG_TWISTS * edges as f64 {
+            return Err(NetError::CurvatureAligned { wrong, edges });
+        }
+        let mean_deg = self.misalignment.to_degrees();
+        if mean_deg > MISALIGNMENT_DEG[0] {
+            return Err(NetError::Misaligned { mean_deg, limit_deg: MISALIGNMENT_DEG[0] });
+        }
+        let mut warnings = Vec::new();
+        if self.negative_share < NEGATIVE_SHARE[1] {
+            warnings.push(NetWarning::NotEverywhereNegative { percent: 100.0 - percent });
+        }
+        if mean_deg > MISALIGNMENT_DEG[1] {
+            warnings.push(NetWarning::Misaligned { mean_deg });
+        }
+        if wrong > 0 {
+            warnings.push(NetWarning::WrongTwists { wrong, edges });
+        }
+        if self.folds > 0 {
+            warnings.push(NetWarning::Folds { edges: self.folds });
+        }
+        if let Some(&first) = self.planar_faces.first() {
+            warnings.push(NetWarning::PlanarFaces { count: self.planar_faces.len(), first });
+        }
+        if !self.two_colourable {
+            warnings.push(NetWarning::NotTwoColourable);
+        }
+        Ok(warnings)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use fixtures::asymptotic_nets;
+    use geom_core::{DVec3, PolyMesh, TriMesh};
+
+    fn gates(positions: Vec<DVec3>, quads: &[[u32; 4]]) -> GateReport {
+        let mesh = PolyMesh::new(positions, quads).unwrap();
+        let triangles = TriMesh::from_poly_mesh(&mesh);
+        inspect(&QuadNet::new(&mesh).unwrap(), &AsymptoticField::new(&triangles))
+    }
+
+    fn grid(n: u32, f: impl Fn(f64, f64) -> DVec3) -> (Vec<DVec3>, Vec<[u32; 4]>) {
+        let at = |i: u32, j: u32| i * (n + 1) + j;
+        let t = |k: u32| 2.0 * f64::from(k) / f64::from(n) - 1.0;
+        let positions = (0..=n)
+            .flat_map(|i| (0..=n).map(move |j| (i, j)))
+            .map(|(i, j)| f(t(i), t(j)))
+            .collect();
+        let quads = (0..n)
+            .flat_map(|i| {
+                (0..n).map(move |j| [at(i, j), at(i + 1, j), at(i + 1, j + 1), at(i, j + 1)])
+            })
+            .collect();
+        (positions, quads)
+    }
+
+    #[test]
+    fn good_nets_pass_and_the_odd_ring_is_told_apart() {
+        let good = asymptotic_nets::catenoid(24, 16).jittered(0.05, 2);
+        let report = gates(good.positions, &good.quads);
+        assert_eq!(report.check().unwrap(), vec![]);
+        let odd = asymptotic_nets::catenoid_odd();
+        let warnings = gates(odd.positions, &odd.quads).check().unwrap();
+        assert_eq!(warnings, vec![NetWarning::NotTwoColourable]);
+    }
+
+    #[test]
+    fn curvature_lines_are_refused() {
+        let saddle = |x: f64, y: f64| DVec3::new(x, y, 0.4 * (x * x - y * y));
+        let (positions, quads) = grid(10, saddle);
+        let report = gates(positions, &quads);
+        assert!(matches!(report.check(), Err(NetError::CurvatureAligned { .. })), "{report:?}");
+        assert!(report.misalignment.to_degrees() > 35.0);
+        // Its diagonals are asymptotic.
+        let turned = |s: f64, t: f64| saddle((s + t) / 2.0, (s - t) / 2.0);
+        let (positions, quads) = grid(10, turned);
+        assert_eq!(gates(positions, &quads).check().unwrap(), vec![]);
+    }
+
+    #[test]
+    fn positively_curved_surfaces_are_refused_in_whole_and_warned_of_in_part() {
+        let (positions, quads) = grid(10, |x, y| DVec3::new(x, y, -0.2 * (x * x + y * y)));
+        let error = gates(positions, &quads).check().unwrap_err();
+        assert!(matches!(error, NetError::NotNegativelyCurved { .. }), "{error}");
+        assert!(error.to_string().contains("trim"));
+        // A saddle with a dent.
+        let dent = |x: f64, y: f64| {
+            let r = (x - 0.5).powi(2) + (y - 0.5).powi(2);
+            DVec3::new(x, y, 0.3 * x * y - 0.08 * (-r / 0.12).exp())
+        };
+        let (positions, quads) = grid(20, dent);
+        let report = gates(positions, &quads);
+        let warnings = report.check().unwrap();
+        assert!(
+            warnings.iter().any(|w| matches!(w, NetWarning::NotEverywhereNegative { .. })),
+            "{report:?}"
+        );
+    }
+
+    #[test]
+    fn misaligned_edges_are_measured() {
+        // Turned by 16 degrees from the asymptotic directions of z = xy.
+        let (sin, cos) = 16.0_f64.to_radians().sin_cos();
+        let (positions, quads) = grid(12, |s, t| {
+            let (x, y) = (cos * s - sin * t, sin * s + cos * t);
+            DVec3::new(x, y, 0.3 * x * y)
+        });
+        let report = gates(positions, &quads);
+        assert!((report.misalignment.to_degrees() - 16.0).abs() < 1.0);
+        let warnings = report.check().unwrap();
+        assert!(warnings.iter().any(|w| matches!(w, NetWarning::Misaligned { .. })));
+        let worse = GateReport { misalignment: 0.4, ..report };
+        assert!(matches!(worse.check(), Err(NetError::Misaligned { .. })));
+    }
+
+    #[test]
+    fn folded_and_planar_faces_are_named() {
+        let (mut positions, quads) = grid(8, |x, y| DVec3::new(x, y, 0.4 * x * y));
+        positions[0].z = positions[1].z + positions[9].z - positions[10].z;
+        let report = gates(positions.clone(), &quads);
+        assert_eq!(report.planar_faces, vec![0]);
+        positions[40] = positions[40] + 2.5 * (positions[41] - positions[40]);
+        let report = gates(positions, &quads);
+        assert!(report.folds > 0);
+        let warnings = report.check().unwrap();
+        assert!(warnings.iter().any(|w| matches!(w, NetWarning::Folds { .. })));
+        assert!(warnings.iter().any(|w| matches!(w, NetWarning::PlanarFaces { first: 0, .. })));
+    }
+}
