@@ -1,5 +1,6 @@
 //! Sparse nonlinear least squares and the other optimisers the methods of the workspace stand on.
 
+mod damping;
 mod error;
 mod lbfgs;
 mod least_squares;
@@ -12,6 +13,7 @@ mod qp;
 mod quadratic;
 mod report;
 
+pub use damping::DampingRule;
 pub use error::SolverError;
 pub use lbfgs::{Euclidean, LbfgsIteration, LbfgsOptions, LbfgsReport, Metric, Objective, lbfgs};
 pub use least_squares::{Iteration, StepModel, System, solve, solve_observed, solve_system};

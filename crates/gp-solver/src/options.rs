@@ -1,5 +1,6 @@
 //! Settings of the least-squares solvers.
 
+use crate::damping::DampingRule;
 use crate::error::SolverError;
 
 /// How a step is made from the linearised problem.
@@ -41,6 +42,8 @@ pub struct Options {
     pub max_iterations: usize,
     /// First damping `μ` of Levenberg-Marquardt, a fraction of the diagonal.
     pub initial_damping: f64,
+    /// How the damping follows success and failure.
+    pub damping_rule: DampingRule,
     /// Converged if `max_i |g_i| / √(A_ii · 2E) ≤ gradient_tol`: the largest cosine of an angle
     /// between the residual and a column of the Jacobian.
     pub gradient_tol: f64,
@@ -61,6 +64,7 @@ impl Default for Options {
             method: Method::LevenbergMarquardt,
             max_iterations: 200,
             initial_damping: 1e-3,
+            damping_rule: DampingRule::default(),
             gradient_tol: 1e-10,
             step_tol: 1e-10,
             energy_tol: 1e-14,

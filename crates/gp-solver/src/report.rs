@@ -55,6 +55,9 @@ pub struct IterationRecord {
     pub energy: f64,
     /// Energy of each term, in the order of the blocks.
     pub terms: Vec<f64>,
+    /// By how much the step that led here lowered the energy. Where blocks have lagged quantities
+    /// this is measured before they follow, so that it need not be the difference of `energy`.
+    pub decrease: f64,
     /// Damping of the step that led here; 0 for the start.
     pub damping: f64,
     /// Euclidean length of the step that led here.

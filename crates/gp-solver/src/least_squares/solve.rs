@@ -140,6 +140,7 @@ impl<'s, 'a, F: FnMut(&Iteration<'_>) -> ControlFlow<()>> Run<'s, 'a, F> {
         let start = IterationRecord {
             energy: system.energy(),
             terms: system.term_energies().to_vec(),
+            decrease: 0.0,
             damping: 0.0,
             step_norm: 0.0,
             gradient_norm: system.scaled_gradient_norm(),
@@ -150,7 +151,7 @@ impl<'s, 'a, F: FnMut(&Iteration<'_>) -> ControlFlow<()>> Run<'s, 'a, F> {
             gradient_norm: start.gradient_norm,
             history: vec![start],
             damping: options.initial_damping,
-            growth: 2.0,
+            growth: options.damping_rule.first_growth(),
             system,
             x,
             options,
@@ -195,10 +196,9 @@ impl<'s, 'a, F: FnMut(&Iteration<'_>) -> ControlFlow<()>> Run<'s, 'a, F> {
         }
     }
 
-    /// Levenberg-Marquardt: raises the damping until a step lowers the energy. Nielsen's rule:
-    /// after success `μ ← μ max(1/3, 1 − (2ϱ − 1)³)`, after the k-th refusal in a row `μ ← 2ᵏ μ`.
+    /// Levenberg-Marquardt: raises the damping until a step lowers the energy.
     fn damped_step(&mut self) -> Result<Result<Taken, Status>, SolverError> {
-        let energy = self.system.energy();
+        let (energy, rule) = (self.system.energy(), self.options.damping_rule);
         let mut factorizations = 0;
         loop {
             factorizations += 1;
@@ -215,9 +215,9 @@ impl<'s, 'a, F: FnMut(&Iteration<'_>) -> ControlFlow<()>> Run<'s, 'a, F> {
                 decrease = energy - self.system.energy_at(&self.trial);
                 let gain = decrease / model.predicted_decrease;
                 if decrease >= 0.0 && gain >= MIN_GAIN {
-                    let factor = (1.0 - (2.0 * gain - 1.0).powi(3)).clamp(1.0 / 3.0, 2.0);
+                    let factor = rule.after_success(gain);
                     self.damping = (damping * factor).max(MIN_DAMPING);
-                    self.growth = 2.0;
+                    self.growth = rule.first_growth();
                     return Ok(Ok(Taken {
                         model,
                         actual_decrease: decrease,
@@ -234,7 +234,7 @@ impl<'s, 'a, F: FnMut(&Iteration<'_>) -> ControlFlow<()>> Run<'s, 'a, F> {
                 }
             }
             self.damping = damping * self.growth;
-            self.growth *= 2.0;
+            self.growth = rule.next_growth(self.growth);
             tracing::trace!(damping, decrease, "step refused");
             if !(self.damping <= MAX_DAMPING) {
                 self.damping = MAX_DAMPING;
@@ -266,6 +266,7 @@ impl<'s, 'a, F: FnMut(&Iteration<'_>) -> ControlFlow<()>> Run<'s, 'a, F> {
         let record = IterationRecord {
             energy,
             terms: self.system.term_energies().to_vec(),
+            decrease: taken.actual_decrease,
             damping: taken.damping,
             step_norm,
             gradient_norm: self.gradient_norm,

@@ -1,0 +1,174 @@
+//! Alignment of the isolines of mean and Gaussian curvature.
+
+use std::sync::Arc;
+
+use gp_solver::{Elements, ResidualBlock};
+use pulp::Simd;
+
+use super::rows::{SampleTerm, fill};
+use crate::field::{Sample, samples};
+use crate::grid::{LaneKernel, SampleGrid, Scratch, load, store};
+use crate::kernel::{THIRD, alignment, curvature_jet};
+use crate::real::{Lanes, Triple};
+
+/// Least value of the residual scale `q₀` as a fraction of `κ⁵`, `κ` the mean absolute principal
+/// curvature. On surfaces where `H` or `K` is constant the scale is all rounding, and dividing by
+/// it would amplify that to a residual of size one.
+pub(crate) const SCALE_FLOOR: f64 = 1e-8;
+
+/// One row per sample, `w (H_u K_v − H_v K_u) / (√Δ q₀)` (Pellis et al. 2021, Eq. 5).
+///
+/// `J / √Δ` does not depend on the parametrisation, and `q₀`, the root mean square of
+/// `|∇_s H| |∇_s K|` over the samples at the start, takes its unit away: the residual is of the
+/// size of the sine of the angle between the isolines. `Δ` is that of the last iterate.
+pub(crate) struct Alignment {
+    grid: Arc<SampleGrid>,
+    elements: Elements,
+    weight: f64,
+    q0: f64,
+    /// Weight over `√Δ q₀`, rows of samples padded to the stride of the grid.
+    factors: Vec<f64>,
+}
+
+impl Alignment {
+    /// `start` are the samples of `grid` on the starting surface; `curvature` is its mean
+    /// absolute principal curvature.
+    pub(crate) fn new(
+        grid: &Arc<SampleGrid>,
+        start: &[Sample],
+        curvature: f64,
+        weight: f64,
+    ) -> Self {
+        let q0 = residual_scale(start, curvature);
+        let factors = padded(grid, start.iter().map(|s| weight / (s.delta().sqrt() * q0)));
+        Self { grid: Arc::clone(grid), elements: grid.elements(), weight, q0, factors }
+    }
+}
+
+/// `q₀`: the root mean square of `|∇_s H| |∇_s K|`, at least [`SCALE_FLOOR`] times `curvature⁵`.
+pub(crate) fn residual_scale(start: &[Sample], curvature: f64) -> f64 {
+    let square = |s: &Sample| {
+        let (h, k) = s.gradients();
+        (h * k).max(0.0)
+    };
+    let mean = start.iter().map(square).sum::<f64>() / start.len() as f64;
+    mean.sqrt().max(SCALE_FLOOR * curvature.powi(5))
+}
+
+/// One value per sample to padded rows.
+pub(crate) fn padded(grid: &SampleGrid, values: impl Iterator<Item = f64>) -> Vec<f64> {
+    let (m_v, stride) = (grid.v.len(), grid.stride());
+    let mut rows = vec![0.0; grid.u.len() * stride];
+    for (s, value) in values.enumerate() {
+        rows[s / m_v * stride + s % m_v] = value;
+    }
+    rows
+}
+
+struct Residual<'a> {
+    factors: &'a [f64],
+    residual: &'a mut [f64],
+}
+
+impl LaneKernel<THIRD> for Residual<'_> {
+    #[inline(always)]
+    fn run<S: Simd>(&mut self, simd: S, at: usize, d: &[Triple<Lanes<S>>; THIRD]) {
+        let jet = curvature_jet(d);
+        let r = jet.h_u * jet.k_v - jet.h_v * jet.k_u;
+        store(simd, self.residual, at, r * load(simd, self.factors, at));
+    }
+}
+
+struct Gradient<'a> {
+    factors: &'a [f64],
+    residual: &'a mut [f64],
+    gradient: &'a mut [f64],
+    stride: usize,
+}
+
+impl LaneKernel<THIRD> for Gradient<'_> {
+    #[inline(always)]
+    fn run<S: Simd>(&mut self, simd: S, at: usize, d: &[Triple<Lanes<S>>; THIRD]) {
+        let factor = load(simd, self.factors, at);
+        let (r, gradient) = alignment(d);
+        store(simd, self.residual, at, r * factor);
+        store_gradient(simd, self.gradient, self.stride, at, factor, &gradient);
+    }
+}
+
+/// Writes `factor · gradient` as one padded row of samples per vector and axis.
+#[inline(always)]
+pub(crate) fn store_gradient<S: Simd, const N: usize>(
+    simd: S,
+    out: &mut [f64],
+    stride: usize,
+    at: usize,
+    factor: Lanes<S>,
+    gradient: &[Triple<Lanes<S>>; N],
+) {
+    for (rows, g) in out.chunks_exact_mut(3 * stride).zip(gradient) {
+        let (x, rest) = rows.split_at_mut(stride);
+        let (y, z) = rest.split_at_mut(stride);
+        store(simd, x, at, g.x * factor);
+        store(simd, y, at, g.y * factor);
+        store(simd, z, at, g.z * factor);
+    }
+}
+
+impl SampleTerm<THIRD> for Alignment {
+    fn row(
+        &self,
+        grid: &SampleGrid,
+        i: usize,
+        unrolled: &[f64],
+        scratch: &mut Scratch,
+        with_gradient: bool,
+    ) {
+        let stride = grid.stride();
+        let factors = &self.factors[i * stride..(i + 1) * stride];
+        // Out of the scratch for the sweep, which needs the rest of it.
+        let mut residual = std::mem::take(&mut scratch.residual);
+        let mut gradient = std::mem::take(&mut scratch.gradient);
+        residual.resize(stride, 0.0);
+        if with_gradient {
+            gradient.resize(3 * THIRD * stride, 0.0);
+            let (residual, gradient) = (&mut residual[..], &mut gradient[..]);
+            let mut kernel = Gradient { factors, residual, gradient, stride };
+            grid.sweep(i, unrolled, scratch, &mut kernel);
+        } else {
+            let mut kernel = Residual { factors, residual: &mut residual };
+            grid.sweep(i, unrolled, scratch, &mut kernel);
+        }
+        scratch.residual = residual;
+        scratch.gradient = gradient;
+    }
+}
+
+impl ResidualBlock for Alignment {
+    fn name(&self) -> &str {
+        "alignment"
+    }
+
+    fn elements(&self) -> &Elements {
+        &self.elements
+    }
+
+    fn refresh(&mut self, x: &[f64]) {
+        let now = samples(&self.grid, x);
+        let stride = self.grid.stride();
+        let m_v = self.grid.v.len();
+        for (s, sample) in now.iter().enumerate() {
+            // A degenerate trial never gets here; a NaN would be named by the solver.
+            let root = sample.delta().sqrt();
+            self.factors[s / m_v * stride + s % m_v] = self.weight / (root * self.q0);
+        }
+    }
+
+    fn residuals(&self, x: &[f64], residuals: &mut [f64]) {
+        fill(&self.grid, &self.elements, self, x, residuals, None);
+    }
+
+    fn linearize(&self, x: &[f64], residuals: &mut [f64], jacobian: &mut [f64]) {
+        fill(&self.grid, &self.elements, self, x, residuals, Some(jacobian));
+    }
+}

@@ -1,0 +1,273 @@
+//! Terms on the control net: closeness, fairness, shape preservation, distance to the last iterate.
+
+use gp_solver::{Elements, ResidualBlock};
+
+/// Size of a control net and whether its ends are joined.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Net {
+    pub(crate) n_u: usize,
+    pub(crate) n_v: usize,
+    pub(crate) closed_u: bool,
+    pub(crate) closed_v: bool,
+}
+
+impl Net {
+    fn index(self, i: usize, j: usize) -> usize {
+        (i % self.n_u) * self.n_v + j % self.n_v
+    }
+
+    /// Second differences of the control polylines, `(before, here, after)`, only where both
+    /// neighbours exist.
+    fn second_differences(self) -> Vec<[usize; 3]> {
+        let mut triples = Vec::new();
+        for i in 0..self.n_u {
+            for j in 0..self.n_v {
+                if self.closed_v || (0 < j && j + 1 < self.n_v) {
+                    let (before, after) = (self.index(i, j + self.n_v - 1), self.index(i, j + 1));
+                    triples.push([before, self.index(i, j), after]);
+                }
+                if self.closed_u || (0 < i && i + 1 < self.n_u) {
+                    let (before, after) = (self.index(i + self.n_u - 1, j), self.index(i + 1, j));
+                    triples.push([before, self.index(i, j), after]);
+                }
+            }
+        }
+        triples
+    }
+
+    /// Edges and both diagonals of every face of the net.
+    fn edges(self) -> Vec<[usize; 2]> {
+        let faces_u = if self.closed_u { self.n_u } else { self.n_u - 1 };
+        let faces_v = if self.closed_v { self.n_v } else { self.n_v - 1 };
+        let mut edges = Vec::new();
+        for i in 0..self.n_u {
+            for j in 0..self.n_v {
+                let here = self.index(i, j);
+                if j < faces_v {
+                    edges.push([here, self.index(i, j + 1)]);
+                }
+                if i < faces_u {
+                    edges.push([here, self.index(i + 1, j)]);
+                }
+                if i < faces_u && j < faces_v {
+                    edges.push([here, self.index(i + 1, j + 1)]);
+                    edges.push([self.index(i + 1, j), self.index(i, j + 1)]);
+                }
+            }
+        }
+        edges
+    }
+}
+
+/// `w (c − c⁰)` for every coordinate of every control point.
+pub(crate) struct Closeness {
+    elements: Elements,
+    reference: Vec<f64>,
+    weight: f64,
+}
+
+impl Closeness {
+    pub(crate) fn new(reference: Vec<f64>, weight: f64) -> Self {
+        Self { elements: diagonal(reference.len()), reference, weight }
+    }
+}
+
+fn diagonal(unknowns: usize) -> Elements {
+    let mut elements = Elements::new();
+    for k in 0..unknowns {
+        elements.push(&[k], 1);
+    }
+    elements
+}
+
+impl ResidualBlock for Closeness {
+    fn name(&self) -> &str {
+        "closeness"
+    }
+
+    fn elements(&self) -> &Elements {
+        &self.elements
+    }
+
+    fn residuals(&self, x: &[f64], residuals: &mut [f64]) {
+        for (r, (x, x0)) in residuals.iter_mut().zip(x.iter().zip(&self.reference)) {
+            *r = self.weight * (x - x0);
+        }
+    }
+
+    fn linearize(&self, x: &[f64], residuals: &mut [f64], jacobian: &mut [f64]) {
+        self.residuals(x, residuals);
+        jacobian.fill(self.weight);
+    }
+
+    fn is_linear(&self) -> bool {
+        true
+    }
+}
+
+/// `ε (x − xᵏ)` with the last iterate `xᵏ` (Pellis et al. 2021, Eq. 11).
+pub(crate) struct LastIterate {
+    elements: Elements,
+    last: Vec<f64>,
+    weight: f64,
+}
+
+impl LastIterate {
+    pub(crate) fn new(x: &[f64], weight: f64) -> Self {
+        Self { elements: diagonal(x.len()), last: x.to_vec(), weight }
+    }
+}
+
+impl ResidualBlock for LastIterate {
+    fn name(&self) -> &str {
+        "last_iterate"
+    }
+
+    fn elements(&self) -> &Elements {
+        &self.elements
+    }
+
+    fn refresh(&mut self, x: &[f64]) {
+        self.last.copy_from_slice(x);
+    }
+
+    fn residuals(&self, x: &[f64], residuals: &mut [f64]) {
+        for (r, (x, x0)) in residuals.iter_mut().zip(x.iter().zip(&self.last)) {
+            *r = self.weight * (x - x0);
+        }
+    }
+
+    fn linearize(&self, x: &[f64], residuals: &mut [f64], jacobian: &mut [f64]) {
+        self.residuals(x, residuals);
+        jacobian.fill(self.weight);
+    }
+
+    fn is_linear(&self) -> bool {
+        true
+    }
+}
+
+/// `w (d − (d₋ + d₊)/2)` along both families of control polylines, `d` the displacement from the
+/// reference net (Pellis et al. 2021, Eq. 11, there with `c` instead of `d`).
+///
+/// On the displacement, because fairness of the net itself slowly flattens the surface.
+pub(crate) struct Fairness {
+    elements: Elements,
+    triples: Vec<[usize; 3]>,
+    /// Second differences of the reference, weighted; empty if the net itself is to be fair.
+    reference: Vec<f64>,
+    weight: f64,
+}
+
+impl Fairness {
+    /// Fairness of the displacement from `reference`, or of the net itself without one.
+    pub(crate) fn new(net: Net, reference: Option<&[f64]>, weight: f64) -> Self {
+        let triples = net.second_differences();
+        let mut elements = Elements::new();
+        for t in &triples {
+            for axis in 0..3 {
+                elements.push(&t.map(|k| 3 * k + axis), 1);
+            }
+        }
+        let mut made = Self { elements, triples, reference: Vec::new(), weight };
+        if let Some(x) = reference {
+            let mut values = vec![0.0; made.elements.rows_total()];
+            made.residuals(x, &mut values);
+            made.reference = values;
+        }
+        made
+    }
+}
+
+impl ResidualBlock for Fairness {
+    fn name(&self) -> &str {
+        "fairness"
+    }
+
+    fn elements(&self) -> &Elements {
+        &self.elements
+    }
+
+    fn residuals(&self, x: &[f64], residuals: &mut [f64]) {
+        for (rows, t) in residuals.chunks_exact_mut(3).zip(&self.triples) {
+            for axis in 0..3 {
+                let [before, here, after] = t.map(|k| x[3 * k + axis]);
+                rows[axis] = self.weight * (here - 0.5 * (before + after));
+            }
+        }
+        for (r, r0) in residuals.iter_mut().zip(&self.reference) {
+            *r -= r0;
+        }
+    }
+
+    fn linearize(&self, x: &[f64], residuals: &mut [f64], jacobian: &mut [f64]) {
+        self.residuals(x, residuals);
+        let w = self.weight;
+        for row in jacobian.chunks_exact_mut(3) {
+            row.copy_from_slice(&[-0.5 * w, w, -0.5 * w]);
+        }
+    }
+
+    fn is_linear(&self) -> bool {
+        true
+    }
+}
+
+/// `w (l − l⁰)` for the lengths of all edges and face diagonals of the control net
+/// (Pellis et al. 2021, Sec. 3.1.4).
+pub(crate) struct Shape {
+    elements: Elements,
+    edges: Vec<[usize; 2]>,
+    lengths: Vec<f64>,
+    weight: f64,
+}
+
+impl Shape {
+    pub(crate) fn new(net: Net, reference: &[f64], weight: f64) -> Self {
+        // An edge without length has no direction to keep.
+        let mut edges = net.edges();
+        edges.retain(|&e| length(reference, e).0 > 0.0);
+        let lengths = edges.iter().map(|&e| length(reference, e).0).collect();
+        let mut elements = Elements::new();
+        for &[a, b] in &edges {
+            let column = |k: usize| [3 * k, 3 * k + 1, 3 * k + 2];
+            let (a, b) = (column(a), column(b));
+            elements.push(&[a[0], a[1], a[2], b[0], b[1], b[2]], 1);
+        }
+        Self { elements, edges, lengths, weight }
+    }
+}
+
+/// Length of an edge and the vector along it.
+fn length(x: &[f64], [a, b]: [usize; 2]) -> (f64, [f64; 3]) {
+    let d: [f64; 3] = std::array::from_fn(|axis| x[3 * b + axis] - x[3 * a + axis]);
+    (d.iter().map(|d| d * d).sum::<f64>().sqrt(), d)
+}
+
+impl ResidualBlock for Shape {
+    fn name(&self) -> &str {
+        "shape"
+    }
+
+    fn elements(&self) -> &Elements {
+        &self.elements
+    }
+
+    fn residuals(&self, x: &[f64], residuals: &mut [f64]) {
+        for ((r, &edge), l0) in residuals.iter_mut().zip(&self.edges).zip(&self.lengths) {
+            *r = self.weight * (length(x, edge).0 - l0);
+        }
+    }
+
+    fn linearize(&self, x: &[f64], residuals: &mut [f64], jacobian: &mut [f64]) {
+        self.residuals(x, residuals);
+        for (row, &edge) in jacobian.chunks_exact_mut(6).zip(&self.edges) {
+            let (l, d) = length(x, edge);
+            for axis in 0..3 {
+                let slope = if l > 0.0 { self.weight * d[axis] / l } else { 0.0 };
+                row[axis] = -slope;
+                row[3 + axis] = slope;
+            }
+        }
+    }
+}

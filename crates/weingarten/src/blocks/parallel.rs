@@ -1,0 +1,122 @@
+//! Geodesic parallelism of the curvature isolines.
+
+use std::sync::Arc;
+
+use gp_solver::{Elements, ResidualBlock};
+use pulp::Simd;
+
+use super::alignment::{SCALE_FLOOR, padded, store_gradient};
+use super::rows::{SampleTerm, fill};
+use crate::field::{Sample, parallel_gradients};
+use crate::grid::{LaneKernel, SampleGrid, Scratch, load, store};
+use crate::kernel::{FOURTH, Field, parallel, parallel_jet};
+use crate::real::{Lanes, Triple};
+
+/// One row per sample, `w (ψ_u f_v − ψ_v f_u) / (√Δ p₀)` with `ψ = |∇_s f|²` and `f` one of the
+/// curvatures (Pellis et al. 2021, Eq. 8, with exact fourth derivatives).
+///
+/// `p₀` is the root mean square of `|∇_s ψ| |∇_s f|` at the start: without it the rows of `K` are
+/// five orders of magnitude larger than those of the alignment and bring the iteration to a halt.
+pub(crate) struct Parallel {
+    field: Field,
+    grid: Arc<SampleGrid>,
+    elements: Elements,
+    factors: Vec<f64>,
+}
+
+impl Parallel {
+    /// As [`super::Alignment::new`]; `x` are the control points `start` was sampled from.
+    pub(crate) fn new(
+        grid: &Arc<SampleGrid>,
+        field: Field,
+        x: &[f64],
+        start: &[Sample],
+        curvature: f64,
+        w: f64,
+    ) -> Self {
+        let gradients = parallel_gradients(grid, field, x, start);
+        let square = gradients.iter().map(|g| g * g).sum::<f64>() / gradients.len() as f64;
+        // ψ is |∇f|²: f, its gradient and ψ's gradient make 1/length^7 for H and 1/length^10 for K.
+        let degree = match field {
+            Field::Mean => 7,
+            Field::Gauss => 10,
+        };
+        let scale = square.sqrt().max(SCALE_FLOOR * curvature.powi(degree));
+        let factors = padded(grid, start.iter().map(|s| w / (s.delta().sqrt() * scale)));
+        Self { field, grid: Arc::clone(grid), elements: grid.elements(), factors }
+    }
+}
+
+struct Kernel<'a> {
+    field: Field,
+    factors: &'a [f64],
+    residual: &'a mut [f64],
+    /// Empty if not wanted.
+    gradient: &'a mut [f64],
+    stride: usize,
+}
+
+impl LaneKernel<FOURTH> for Kernel<'_> {
+    #[inline(always)]
+    fn run<S: Simd>(&mut self, simd: S, at: usize, d: &[Triple<Lanes<S>>; FOURTH]) {
+        let factor = load(simd, self.factors, at);
+        if self.gradient.is_empty() {
+            let jet = parallel_jet(self.field, d);
+            let r = jet.psi_u * jet.f_v - jet.psi_v * jet.f_u;
+            store(simd, self.residual, at, r * factor);
+        } else {
+            let (r, gradient) = parallel(self.field, d);
+            store(simd, self.residual, at, r * factor);
+            store_gradient(simd, self.gradient, self.stride, at, factor, &gradient);
+        }
+    }
+}
+
+impl SampleTerm<FOURTH> for Parallel {
+    fn row(
+        &self,
+        grid: &SampleGrid,
+        i: usize,
+        unrolled: &[f64],
+        scratch: &mut Scratch,
+        with_gradient: bool,
+    ) {
+        let stride = grid.stride();
+        let factors = &self.factors[i * stride..(i + 1) * stride];
+        let mut residual = std::mem::take(&mut scratch.residual);
+        let mut gradient = std::mem::take(&mut scratch.gradient);
+        residual.resize(stride, 0.0);
+        gradient.resize(if with_gradient { 3 * FOURTH * stride } else { 0 }, 0.0);
+        let mut kernel = Kernel {
+            field: self.field,
+            factors,
+            residual: &mut residual,
+            gradient: &mut gradient,
+            stride,
+        };
+        grid.sweep(i, unrolled, scratch, &mut kernel);
+        scratch.residual = residual;
+        scratch.gradient = gradient;
+    }
+}
+
+impl ResidualBlock for Parallel {
+    fn name(&self) -> &str {
+        match self.field {
+            Field::Mean => "parallel_h",
+            Field::Gauss => "parallel_k",
+        }
+    }
+
+    fn elements(&self) -> &Elements {
+        &self.elements
+    }
+
+    fn residuals(&self, x: &[f64], residuals: &mut [f64]) {
+        fill(&self.grid, &self.elements, self, x, residuals, None);
+    }
+
+    fn linearize(&self, x: &[f64], residuals: &mut [f64], jacobian: &mut [f64]) {
+        fill(&self.grid, &self.elements, self, x, residuals, Some(jacobian));
+    }
+}

@@ -1,0 +1,171 @@
+//! Rows that ask for a certain relation between the curvatures.
+
+use std::sync::Arc;
+
+use gp_solver::{Elements, ResidualBlock};
+use pulp::Simd;
+
+use super::alignment::store_gradient;
+use super::rows::{SampleTerm, fill};
+use crate::field::{Sample, samples};
+use crate::grid::{LaneKernel, SampleGrid, Scratch, load, store};
+use crate::kernel::{SECOND, curvature, second};
+use crate::real::{Lanes, Real, Triple};
+use crate::target::Target;
+
+/// One row per sample, `w (α H + β K + γ)`, with coefficients that a [`Target`] updates from the
+/// last iterate, or the ratio of the principal curvatures.
+pub(crate) struct RelationRows {
+    grid: Arc<SampleGrid>,
+    elements: Elements,
+    target: Target,
+    /// Rows of `α`, `β`, `γ` for each row of samples, padded.
+    coefficients: Vec<f64>,
+    weight: f64,
+}
+
+impl RelationRows {
+    pub(crate) fn new(
+        grid: &Arc<SampleGrid>,
+        target: Target,
+        start: &[Sample],
+        weight: f64,
+    ) -> Self {
+        let coefficients = vec![0.0; 3 * grid.u.len() * grid.stride()];
+        let elements = grid.elements();
+        let mut made = Self { grid: Arc::clone(grid), elements, target, coefficients, weight };
+        made.set_coefficients(start);
+        made
+    }
+
+    fn set_coefficients(&mut self, samples: &[Sample]) {
+        let (m_v, stride) = (self.grid.v.len(), self.grid.stride());
+        let rows = self.target.rows(samples);
+        for (s, row) in rows.iter().enumerate() {
+            for (which, value) in row.iter().enumerate() {
+                let slot = (3 * (s / m_v) + which) * stride + s % m_v;
+                self.coefficients[slot] = self.weight * value;
+            }
+        }
+    }
+}
+
+/// `α H + β K + γ`.
+struct Affine<'a> {
+    coefficients: [&'a [f64]; 3],
+    residual: &'a mut [f64],
+    gradient: &'a mut [f64],
+    stride: usize,
+}
+
+impl LaneKernel<SECOND> for Affine<'_> {
+    #[inline(always)]
+    fn run<S: Simd>(&mut self, simd: S, at: usize, d: &[Triple<Lanes<S>>; SECOND]) {
+        let [alpha, beta, gamma] = self.coefficients.map(|c| load(simd, c, at));
+        let c = curvature(&second(d));
+        store(simd, self.residual, at, alpha.mul_add(c.h, beta.mul_add(c.k, gamma)));
+        if !self.gradient.is_empty() {
+            put(simd, self.gradient, self.stride, at, &c, alpha, beta);
+        }
+    }
+}
+
+/// `w (κ₁ − R κ₂)` with `κ₁,₂ = H ± √(H² − K + δ²)`.
+struct Ratio<'a> {
+    ratio: f64,
+    scale: f64,
+    smoothing: f64,
+    residual: &'a mut [f64],
+    gradient: &'a mut [f64],
+    stride: usize,
+}
+
+impl LaneKernel<SECOND> for Ratio<'_> {
+    #[inline(always)]
+    fn run<S: Simd>(&mut self, simd: S, at: usize, d: &[Triple<Lanes<S>>; SECOND]) {
+        let c = curvature(&second(d));
+        let smoothing = c.h.constant(self.smoothing);
+        let root = (c.h.mul_add(c.h, smoothing * smoothing) - c.k).sqrt();
+        let (minus, plus) = (self.scale * (1.0 - self.ratio), self.scale * (1.0 + self.ratio));
+        store(simd, self.residual, at, c.h.scale(minus) + root.scale(plus));
+        if !self.gradient.is_empty() {
+            let by_root = root.recip().scale(plus);
+            let alpha = by_root.mul_add(c.h, c.h.constant(minus));
+            put(simd, self.gradient, self.stride, at, &c, alpha, -by_root.scale(0.5));
+        }
+    }
+}
+
+/// Writes `α ∇H + β ∇K`.
+#[inline(always)]
+fn put<S: Simd>(
+    simd: S,
+    out: &mut [f64],
+    stride: usize,
+    at: usize,
+    c: &crate::kernel::Curvature<Lanes<S>>,
+    alpha: Lanes<S>,
+    beta: Lanes<S>,
+) {
+    let zero = c.h.constant(0.0);
+    let mut gradient = [Triple { x: zero, y: zero, z: zero }; SECOND];
+    for (i, slot) in gradient[1..].iter_mut().enumerate() {
+        *slot = c.grad_h[i].scale(alpha).plus(beta, c.grad_k[i]);
+    }
+    store_gradient(simd, out, stride, at, zero.constant(1.0), &gradient);
+}
+
+impl SampleTerm<SECOND> for RelationRows {
+    fn row(
+        &self,
+        grid: &SampleGrid,
+        i: usize,
+        unrolled: &[f64],
+        scratch: &mut Scratch,
+        with_gradient: bool,
+    ) {
+        let stride = grid.stride();
+        let mut residual = std::mem::take(&mut scratch.residual);
+        let mut gradient = std::mem::take(&mut scratch.gradient);
+        residual.resize(stride, 0.0);
+        gradient.resize(if with_gradient { 3 * SECOND * stride } else { 0 }, 0.0);
+        let (r, g) = (&mut residual[..], &mut gradient[..]);
+        if let Some((ratio, scale, smoothing)) = self.target.ratio() {
+            let scale = self.weight * scale;
+            let mut kernel = Ratio { ratio, scale, smoothing, residual: r, gradient: g, stride };
+            grid.sweep(i, unrolled, scratch, &mut kernel);
+        } else {
+            let rows = &self.coefficients[3 * i * stride..3 * (i + 1) * stride];
+            let coefficients = std::array::from_fn(|k| &rows[k * stride..(k + 1) * stride]);
+            let mut kernel = Affine { coefficients, residual: r, gradient: g, stride };
+            grid.sweep(i, unrolled, scratch, &mut kernel);
+        }
+        scratch.residual = residual;
+        scratch.gradient = gradient;
+    }
+}
+
+impl ResidualBlock for RelationRows {
+    fn name(&self) -> &str {
+        "relation"
+    }
+
+    fn elements(&self) -> &Elements {
+        &self.elements
+    }
+
+    fn refresh(&mut self, x: &[f64]) {
+        if self.target.follows() {
+            let now = samples(&self.grid, x);
+            self.set_coefficients(&now);
+        }
+    }
+
+    fn residuals(&self, x: &[f64], residuals: &mut [f64]) {
+        fill(&self.grid, &self.elements, self, x, residuals, None);
+    }
+
+    fn linearize(&self, x: &[f64], residuals: &mut [f64], jacobian: &mut [f64]) {
+        fill(&self.grid, &self.elements, self, x, residuals, Some(jacobian));
+    }
+}

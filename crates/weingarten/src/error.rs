@@ -1,0 +1,59 @@
+//! Why an optimisation cannot be attempted.
+
+use bspline::{FitError, KnotError, SplineError};
+use gp_solver::SolverError;
+
+/// What makes it impossible to attempt an optimisation. Not converging is a status, not an error.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+#[expect(missing_docs, reason = "the messages spell out every field")]
+pub enum WeingartenError {
+    /// A pole, a cusp or a collapsed edge.
+    #[error(
+        "the surface is pinched at u = {u}, v = {v}: its tangents vanish or are parallel there; \
+         cut the pole off or spread the control points that coincide"
+    )]
+    Singular { u: f64, v: f64 },
+    /// All control points in one place.
+    #[error("all control points coincide, so the surface has no extent; check the coordinates")]
+    NoExtent,
+    /// Not enough samples to see the surface.
+    #[error("{found} samples in {direction} are too few; ask for at least {needed}")]
+    TooFewSamples { direction: &'static str, found: usize, needed: usize },
+    /// More samples or control points than could ever be wanted.
+    #[error("{count} {what} are more than the {limit} that are supported; ask for fewer")]
+    TooMany { what: &'static str, count: usize, limit: usize },
+    /// A weight or coefficient that makes no sense.
+    #[error("option {name} is {value}; it must be {need}")]
+    BadOption { name: &'static str, value: f64, need: &'static str },
+    /// A relation that cannot be set up.
+    #[error("the curve of the curvature relation has {found} control points; give at least 2")]
+    ShortCurve { found: usize },
+    /// A control point to move that is not there.
+    #[error("control point ({i}, {j}) cannot be moved: the net has {n_u} x {n_v}, counted from 0")]
+    NoSuchControlPoint { i: usize, j: usize, n_u: usize, n_v: usize },
+    /// Border control that needs the border control points to lie on the border.
+    #[error(
+        "the knots in {direction} are not clamped, so border control points do not lie on the \
+         border; refit with levels, or leave the border free"
+    )]
+    NotClamped { direction: &'static str },
+    /// A combination that does not exist.
+    #[error("{what} needs the reduced formulation; drop `formulation: lifted`")]
+    NeedsReduced { what: &'static str },
+    /// A checkpoint of another problem.
+    #[error("the checkpoint belongs to {what}; resume with the input and options it was made with")]
+    ForeignCheckpoint { what: &'static str },
+    /// A level that cannot be fitted.
+    #[error("level {level}: {source}")]
+    Level { level: String, source: FitError },
+    /// A level with too few control points.
+    #[error("level {level}: {source}")]
+    LevelKnots { level: String, source: KnotError },
+    /// A surface that is no surface.
+    #[error(transparent)]
+    Spline(#[from] SplineError),
+    /// From the solver.
+    #[error(transparent)]
+    Solver(#[from] SolverError),
+}
