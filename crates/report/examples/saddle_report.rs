@@ -185,5 +185,10 @@ fn main() -> Result<(), Box<dyn Error>> {
     report.metrics.insert("ms_per_iteration".to_owned(), 7.3.into());
     report.run.insert("threads".to_owned(), 2.into());
     std::fs::write(page, report.to_html())?;
+    if let Some(folder) = arguments.next() {
+        for figure in report.figures()? {
+            std::fs::write(std::path::Path::new(&folder).join(figure.name), figure.bytes)?;
+        }
+    }
     Ok(())
 }

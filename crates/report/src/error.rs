@@ -20,6 +20,9 @@ pub enum ReportError {
     /// Two parts of one view share an id.
     #[error("the view `{view}` already has `{id}`; give each field, group and line set its own id")]
     Duplicate { view: String, id: String },
+    /// A picture could not be encoded.
+    #[error("the picture of view `{view}` cannot be encoded: {reason}")]
+    Picture { view: String, reason: String },
     /// Nothing to draw.
     #[error("the view `{view}` has no triangles; sample the surface first")]
     Empty { view: String },

@@ -2,7 +2,7 @@
 
 use std::fmt::Write as _;
 
-use serde_json::{Map, Value};
+use serde_json::{Map, Value, json};
 
 use crate::energies::energies_svg;
 use crate::histogram::histogram_svg;
@@ -79,7 +79,8 @@ impl Report {
         }
         page += "</main>\n<footer>Written by Umbilic. Nothing in this page is loaded from elsewhere.</footer>\n";
         let _ = writeln!(page, "{}", json_block("data", &data.json));
-        let _ = writeln!(page, "{}", json_block("run", &Value::Object(run)));
+        let run = json!({"command": self.command_line, "rows": run});
+        let _ = writeln!(page, "{}", json_block("run", &run));
         for (i, text) in data.packed_stages.iter().enumerate() {
             let _ = writeln!(page, "<script type=\"text/plain\" id=\"stage-{i}\">{text}</script>");
         }
@@ -95,9 +96,8 @@ impl Report {
             let status = escape(&self.status.replace('_', " "));
             let _ = writeln!(head, "<span class=\"{class}\">{status}</span>");
         }
-        if !self.command_line.is_empty() {
-            let _ = writeln!(head, "<code>{}</code>", escape(&self.command_line));
-        }
+        // Filled by the script: paths and thread counts in it change from run to run.
+        head += "<code id=\"command\"></code>\n";
         head += "</header>\n";
         if !self.warnings.is_empty() {
             head += "<ul class=\"warnings\" aria-label=\"Warnings\">\n";

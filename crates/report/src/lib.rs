@@ -37,25 +37,33 @@
 //! # Ok::<(), ReportError>(())
 //! ```
 //!
+//! [`Report::figures`] gives the same plots as SVG and shaded pictures as PNG, without a browser.
+//!
 //! Colour maps are safe for colour-blind readers. Numbers that change from run to run (timings,
-//! threads) stand in one JSON block of the page, `<script id="run">`; the rest of the bytes depend
+//! threads, the command line) stand in one JSON block of the page, `<script id="run">`; the rest of the bytes depend
 //! on the data alone.
 
 mod codec;
 mod colormap;
+mod diagram;
 mod energies;
 mod error;
+mod figures;
+mod font;
 mod histogram;
 mod html;
 mod layers;
 mod numbers;
 mod page_data;
+mod picture;
 mod plots;
+mod raster;
 mod report;
 mod surface_view;
 mod svg;
 
 pub use error::ReportError;
+pub use figures::Figure;
 pub use layers::{FaceGroups, FieldScale, LineRole, LineSet, ScalarField};
 pub use plots::{EnergyHistory, Histogram, RelationCurve, Seam, SeamTable, Series};
 pub use report::Report;

@@ -7,12 +7,13 @@ use crate::{EnergyHistory, Histogram, RelationCurve, SeamTable, SurfaceView};
 /// Everything a command has to tell, as plain data.
 ///
 /// All of it is optional: what is not there is not shown. The bytes of [`Report::to_html`] depend
-/// on nothing but this record, and only on [`Report::run`] for what changes from run to run.
+/// on nothing but this record; what changes from run to run stands in one JSON block of the page.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Report {
     /// Heading.
     pub title: String,
-    /// The command as it was typed.
+    /// The command as it was typed; it stands with [`Report::run`], since paths and thread counts in
+    /// it change from run to run.
     pub command_line: String,
     /// How it ended, such as `converged`; empty for commands that do not iterate.
     pub status: String,

@@ -270,9 +270,10 @@ function nearestNormal(stage, place) {
 
 // What changes from run to run is written by the page, so that the rest of the file repeats.
 function showRun(run) {
+  byId("command").textContent = run.command;
   const body = byId("run-rows");
   if (!body) return;
-  for (const [name, value] of Object.entries(run)) {
+  for (const [name, value] of Object.entries(run.rows)) {
     const text = typeof value === "number" ? formatNumber(value, 4) : typeof value === "string" ? value : JSON.stringify(value);
     body.append(element("tr", {}, element("th", { scope: "row" }, name), element("td", {}, text)));
   }

@@ -1,0 +1,96 @@
+//! Fills reports: surfaces and meshes become views with exact normals and curvatures, outcomes
+//! become pages and figures.
+//!
+//! A command with `--report` and `--figures` flattens [`ReportArgs`], calls its `check` first,
+//! and ends with
+//!
+//! ```ignore
+//! if self.report.wanted() {
+//!     let mut report = report_support::new("Curvature of a surface");
+//!     report.stages.push(report_support::spline_view("surface", &[&surface], None, "mm")?);
+//!     report_support::add_files(&mut outcome, &self.report, context, report)?;
+//! }
+//! ```
+#![allow(dead_code, reason = "each helper is used by the commands that make such a view")]
+
+mod jets;
+mod mesh;
+
+pub(crate) use jets::{JetGrid, jets_view, spline_view};
+pub(crate) use mesh::mesh_view;
+
+use crate::args::ReportArgs;
+use crate::context::Context;
+use crate::failure::Failure;
+use crate::outcome::{Outcome, Status};
+use report::Report;
+use serde_json::Value;
+
+impl ReportArgs {
+    /// Whether a report has to be filled at all.
+    pub(crate) fn wanted(&self) -> bool {
+        self.report.is_some() || self.figures.is_some()
+    }
+}
+
+/// An empty report of this run.
+pub(crate) fn new(title: &str) -> Report {
+    let words = std::env::args().skip(1).map(|word| quoted(&word));
+    let line = std::iter::once("umbilic".to_owned()).chain(words).collect::<Vec<_>>().join(" ");
+    Report::new(title, line)
+}
+
+/// Takes status, warnings and metrics from `outcome`, which gets the page and the figures as
+/// further files. `iterates` commands show their status, others always converge.
+pub(crate) fn add_files(
+    outcome: &mut Outcome,
+    args: &ReportArgs,
+    context: &Context,
+    mut report: Report,
+) -> Result<(), Failure> {
+    if outcome.iterations > 0 || outcome.status != Status::Converged {
+        let status = serde_json::to_value(outcome.status).map_err(Failure::other)?;
+        report.status = status.as_str().unwrap_or_default().to_owned();
+    }
+    report.warnings.extend(outcome.warnings.iter().cloned());
+    if let Value::Object(metrics) = &outcome.metrics {
+        report.metrics = metrics.clone();
+    }
+    report.run.insert("threads".to_owned(), context.threads.into());
+    if let Some(path) = &args.report {
+        outcome.files.push((path.clone(), report.to_html().into_bytes()));
+    }
+    if let Some(folder) = &args.figures {
+        for figure in report.figures().map_err(Failure::other)? {
+            outcome.files.push((folder.join(figure.name), figure.bytes));
+        }
+    }
+    Ok(())
+}
+
+/// The word as a shell would need it.
+fn quoted(word: &str) -> String {
+    let plain = |c: char| c.is_alphanumeric() || "-_./=,:+@%".contains(c);
+    if !word.is_empty() && word.chars().all(plain) {
+        word.to_owned()
+    } else {
+        format!("'{}'", word.replace('\'', r"'\''"))
+    }
+}
+
+/// A view that was refused is a slip of ours, not of the user.
+fn refused(error: report::ReportError) -> Failure {
+    Failure::other(format!("cannot draw the result: {error}"))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::quoted;
+
+    #[test]
+    fn words_are_quoted_where_a_shell_needs_it() {
+        assert_eq!(quoted("--levels=10x8,14x10"), "--levels=10x8,14x10");
+        assert_eq!(quoted("my roof.ron"), "'my roof.ron'");
+        assert_eq!(quoted("it's"), r"'it'\''s'");
+    }
+}

@@ -1,0 +1,110 @@
+//! The plots and pictures of a report as files in memory.
+
+use rayon::prelude::*;
+
+use crate::diagram::diagram_svg;
+use crate::energies::energies_svg;
+use crate::histogram::histogram_svg;
+use crate::picture::{Layer, picture_png};
+use crate::{Report, ReportError};
+
+/// A file in memory; the caller writes it.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Figure {
+    /// File name with its extension, of lower-case letters, digits and `-`.
+    pub name: String,
+    /// The content.
+    pub bytes: Vec<u8>,
+}
+
+impl Report {
+    /// The plots of the page as SVG, and a shaded PNG picture of every field and grouping of
+    /// every stage. Names follow what they show: `histogram-kinks.svg`, `energies.svg`,
+    /// `after-diagram.svg`, `after-k.png`.
+    ///
+    /// # Errors
+    /// [`ReportError::Picture`] if a picture cannot be encoded.
+    pub fn figures(&self) -> Result<Vec<Figure>, ReportError> {
+        let mut figures = Vec::new();
+        let mut plot = |name: String, svg: String| {
+            figures.push(Figure { name, bytes: svg.into_bytes() });
+        };
+        for histogram in &self.histograms {
+            plot(format!("histogram-{}.svg", file_word(&histogram.id)), histogram_svg(histogram));
+        }
+        if let Some(history) = &self.energies {
+            plot("energies.svg".to_owned(), energies_svg(history));
+        }
+        for view in &self.stages {
+            if let Some(svg) = diagram_svg(view, &self.relations) {
+                plot(format!("{}-diagram.svg", file_word(view.name())), svg);
+            }
+        }
+        let mut pictures = Vec::new();
+        for view in &self.stages {
+            let stage = file_word(view.name());
+            for field in view.fields() {
+                let name = format!("{stage}-{}.png", file_word(&field.id));
+                pictures.push((name, view, Layer::Field(field)));
+            }
+            for groups in view.groups() {
+                let name = format!("{stage}-{}.png", file_word(&groups.id));
+                pictures.push((name, view, Layer::Groups(groups)));
+            }
+        }
+        let drawn = pictures.into_par_iter().map(|(name, view, layer)| {
+            let bytes = picture_png(view, layer, &self.length_unit);
+            bytes.map(|bytes| Figure { name, bytes })
+        });
+        // `collect` keeps the order of the list, whatever the number of threads.
+        let drawn: Result<Vec<Figure>, ReportError> = drawn.collect();
+        figures.extend(drawn?);
+        number_duplicates(&mut figures);
+        Ok(figures)
+    }
+}
+
+/// Lower-case letters, digits and single hyphens, for names of files.
+fn file_word(text: &str) -> String {
+    let mut word = String::new();
+    for c in text.to_lowercase().chars() {
+        if c.is_ascii_alphanumeric() {
+            word.push(c);
+        } else if !word.is_empty() && !word.ends_with('-') {
+            word.push('-');
+        }
+    }
+    let word = word.trim_end_matches('-');
+    if word.is_empty() { "view".to_owned() } else { word.to_owned() }
+}
+
+/// Two stages of one name must not overwrite each other's figures.
+fn number_duplicates(figures: &mut [Figure]) {
+    let mut seen = std::collections::BTreeMap::new();
+    for figure in figures {
+        let count = seen.entry(figure.name.clone()).or_insert(0_usize);
+        *count += 1;
+        if let (2.., Some((stem, extension))) = (*count, figure.name.rsplit_once('.')) {
+            figure.name = format!("{stem}-{count}.{extension}");
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn file_words_are_plain() {
+        assert_eq!(file_word("After (25x18)"), "after-25x18");
+        assert_eq!(file_word("κ"), "view");
+    }
+
+    #[test]
+    fn equal_names_get_numbers() {
+        let figure = |name: &str| Figure { name: name.into(), bytes: Vec::new() };
+        let mut figures = [figure("a.svg"), figure("a.svg"), figure("b.svg")];
+        number_duplicates(&mut figures);
+        assert_eq!(figures.map(|f| f.name), ["a.svg", "a-2.svg", "b.svg"]);
+    }
+}
