@@ -7,6 +7,7 @@ mod config;
 mod context;
 mod failure;
 mod outcome;
+mod report_support;
 
 use clap::Parser;
 use context::Context;

@@ -7,22 +7,22 @@
 //! ```ignore
 //! if self.report.wanted() {
 //!     let mut report = report_support::new("Curvature of a surface");
-//!     report.stages.push(report_support::spline_view("surface", &[&surface], None, "mm")?);
+//!     report.stages.push(report_support::jets::spline_view("surface", &[&surface], None, "mm")?);
 //!     report_support::add_files(&mut outcome, &self.report, context, report)?;
 //! }
 //! ```
 #![allow(dead_code, reason = "each helper is used by the commands that make such a view")]
 
-mod jets;
-mod mesh;
-
-pub(crate) use jets::{JetGrid, jets_view, spline_view};
-pub(crate) use mesh::mesh_view;
+pub(crate) mod jets;
+pub(crate) mod mesh;
 
 use crate::args::ReportArgs;
 use crate::context::Context;
 use crate::failure::Failure;
 use crate::outcome::{Outcome, Status};
+use crate::report_support::jets::spline_view;
+use crate::report_support::mesh::mesh_view;
+use exchange::Model;
 use report::Report;
 use serde_json::Value;
 
@@ -38,6 +38,21 @@ pub(crate) fn new(title: &str) -> Report {
     let words = std::env::args().skip(1).map(|word| quoted(&word));
     let line = std::iter::once("umbilic".to_owned()).chain(words).collect::<Vec<_>>().join(" ");
     Report::new(title, line)
+}
+
+/// Adds a stage for the surfaces of `model` and one for each of its meshes.
+pub(crate) fn add_model(report: &mut Report, model: &Model) -> Result<(), Failure> {
+    report.length_unit = model.unit.to_string();
+    for mesh in model.meshes.iter().filter(|m| !m.faces.is_empty()) {
+        let name = if mesh.name.is_empty() { "mesh" } else { &mesh.name };
+        report.stages.push(mesh_view(name, mesh, &report.length_unit)?);
+    }
+    if !model.surfaces.is_empty() {
+        let surfaces: Vec<_> = model.surfaces.iter().map(|s| &s.surface).collect();
+        let name = if surfaces.len() == 1 { "surface" } else { "surfaces" };
+        report.stages.push(spline_view(name, &surfaces, None, &report.length_unit)?);
+    }
+    Ok(())
 }
 
 /// Takes status, warnings and metrics from `outcome`, which gets the page and the figures as

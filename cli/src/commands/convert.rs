@@ -1,9 +1,10 @@
 //! `umbilic convert IN OUT`.
 
-use crate::args::check_output_path;
+use crate::args::{ReportArgs, check_output_path};
 use crate::context::Context;
 use crate::failure::Failure;
 use crate::outcome::{Outcome, Status};
+use crate::report_support;
 use std::path::PathBuf;
 
 /// Arguments of `convert`.
@@ -13,19 +14,27 @@ pub(crate) struct Convert {
     input: PathBuf,
     /// File to write; the extension chooses the format
     output: PathBuf,
+    #[command(flatten)]
+    report: ReportArgs,
 }
 
 impl Convert {
-    pub(crate) fn run(self, _context: &Context) -> Result<Outcome, Failure> {
+    pub(crate) fn run(self, context: &Context) -> Result<Outcome, Failure> {
         exchange::check_format(&self.output).map_err(|e| Failure::input(&self.output, e))?;
         check_output_path(&self.output)?;
+        self.report.check()?;
         let model =
             exchange::read_model(&self.input).map_err(|e| Failure::input(&self.input, e))?;
         let bytes = exchange::encode_model(&self.output, &model)
             .map_err(|e| Failure::input(&self.output, e))?;
         let mut outcome = Outcome::new(Status::Converged, 0).with_input(&self.input);
-        outcome.warnings = model.warnings;
+        outcome.warnings.clone_from(&model.warnings);
         outcome.files.push((self.output, bytes));
+        if self.report.wanted() {
+            let mut report = report_support::new("Content of a file");
+            report_support::add_model(&mut report, &model)?;
+            report_support::add_files(&mut outcome, &self.report, context, report)?;
+        }
         Ok(outcome)
     }
 }

@@ -199,7 +199,7 @@ fn direction_strokes(grids: &[JetGrid]) -> [LineSet; 2] {
                 let next = at(if i + 1 < grid.rows { i + 1 } else { i.saturating_sub(1) }, j);
                 let length = 0.36 * step as f64 * jet.position().distance(next.position());
                 let Ok(second) = jet.second_form() else { continue };
-                let mut stroke = |into: &mut Vec<Vec<DVec3>>, direction: DVec2| {
+                let stroke = |into: &mut Vec<Vec<DVec3>>, direction: DVec2| {
                     let half = jet.tangent(direction).normalize_or_zero() * length;
                     let ends = [jet.position() - half, jet.position() + half];
                     if ends.iter().all(|p| p.is_finite()) {
@@ -211,7 +211,7 @@ fn direction_strokes(grids: &[JetGrid]) -> [LineSet; 2] {
                     stroke(&mut principal, p.direction2);
                 }
                 if let Ok(Some(pair)) = asymptotic_directions(jet.first_form(), second) {
-                    pair.map(|d| stroke(&mut asymptotic, d));
+                    pair.iter().for_each(|d| stroke(&mut asymptotic, *d));
                 }
             }
         }

@@ -36,14 +36,16 @@ pub(crate) fn mesh_view(
     let mut view = SurfaceView::new(name, mesh.positions.clone(), normals, triangles)
         .and_then(|v| v.with_lines(LineSet::new("edges", "mesh edges", LineRole::Mesh, edges)))
         .map_err(refused)?;
-    if mesh.lines.len() > 0 {
+    if !mesh.lines.is_empty() {
         let curves = (0..mesh.lines.len()).map(|k| mesh.polyline(k).collect()).collect();
         let mut set = LineSet::new("curves", "curves", LineRole::Curves, curves);
         set.visible = true;
         view = view.with_lines(set).map_err(refused)?;
     }
     for field in &mesh.vertex_fields {
-        view = view.with_field(known_field(&field.name, &field.values, length_unit)).map_err(refused)?;
+        view = view
+            .with_field(known_field(&field.name, &field.values, length_unit))
+            .map_err(refused)?;
     }
     if mesh.groups.len() > 1 {
         let names = mesh.groups.iter().map(|g| g.name.clone()).collect();
