@@ -1,8 +1,10 @@
 //! `umbilic analyze INPUT`.
 
+use crate::args::ReportArgs;
 use crate::context::Context;
 use crate::failure::Failure;
 use crate::outcome::{Outcome, Status};
+use crate::report_support;
 use exchange::{Mesh, Model};
 use geom_core::{CurvatureStatistics, ValueRange, mesh_curvature_statistics};
 use serde::Serialize;
@@ -14,10 +16,13 @@ use std::path::{Path, PathBuf};
 pub(crate) struct Analyze {
     /// File with surfaces or meshes; surfaces are preferred if it has both
     input: PathBuf,
+    #[command(flatten)]
+    report: ReportArgs,
 }
 
 impl Analyze {
-    pub(crate) fn run(self, _context: &Context) -> Result<Outcome, Failure> {
+    pub(crate) fn run(self, context: &Context) -> Result<Outcome, Failure> {
+        self.report.check()?;
         let model =
             exchange::read_model(&self.input).map_err(|e| Failure::input(&self.input, e))?;
         let (kind, statistics) = measure(&self.input, &model)?;
@@ -25,13 +30,18 @@ impl Analyze {
             .with_input(&self.input)
             .with_metrics(&AnalyzeMetrics::new(kind, &statistics))?;
         outcome.summary = summary(&self.input, &model, kind, &statistics);
-        outcome.warnings = model.warnings;
+        outcome.warnings.clone_from(&model.warnings);
         if statistics.singular > 0 {
             outcome.warnings.push(format!(
                 "{} of {} points are singular and have no curvature",
                 statistics.singular,
                 statistics.singular + statistics.samples
             ));
+        }
+        if self.report.wanted() {
+            let mut report = report_support::new("Curvature analysis");
+            report_support::add_model(&mut report, &model)?;
+            report_support::add_files(&mut outcome, &self.report, context, report)?;
         }
         Ok(outcome)
     }

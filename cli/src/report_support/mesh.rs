@@ -3,11 +3,12 @@
 use super::refused;
 use crate::failure::Failure;
 use exchange::Mesh;
-use geom_core::{DVec3, TriMesh};
+use geom_core::{DVec3, TriMesh, VertexCurvature, vertex_curvatures};
 use report::{FaceGroups, LineRole, LineSet, ScalarField, SurfaceView};
 
 /// A view of a mesh with its own normals (or those averaged at its vertices), its vertex fields,
-/// its groups and its edges. Fields called `H`, `K`, `k1` and `k2` feed the curvature diagram.
+/// its groups and its edges. Fields called `H`, `K`, `k1` and `k2` feed the curvature diagram;
+/// without `H` and `K` they are estimated.
 pub(crate) fn mesh_view(
     name: &str,
     mesh: &Mesh,
@@ -47,12 +48,33 @@ pub(crate) fn mesh_view(
             .with_field(known_field(&field.name, &field.values, length_unit))
             .map_err(refused)?;
     }
+    if view.field("H").is_none() && view.field("K").is_none() {
+        view = with_estimated_curvatures(view, mesh, length_unit)?;
+    }
     if mesh.groups.len() > 1 {
         let names = mesh.groups.iter().map(|g| g.name.clone()).collect();
         let (id, label) = ("groups".to_owned(), "groups".to_owned());
         view = view.with_groups(FaceGroups { id, label, of_triangle, names }).map_err(refused)?;
     }
     Ok(view)
+}
+
+/// Adds H and K fitted to the neighbourhood of each vertex, where the mesh is a manifold.
+fn with_estimated_curvatures(
+    view: SurfaceView,
+    mesh: &Mesh,
+    length_unit: &str,
+) -> Result<SurfaceView, Failure> {
+    let Ok(manifold) = mesh.to_poly_mesh() else { return Ok(view) };
+    let fitted = vertex_curvatures(&manifold);
+    let field = |of: fn(&VertexCurvature) -> f64| -> Vec<f64> {
+        fitted.iter().map(|c| c.as_ref().map_or(f64::NAN, of)).collect()
+    };
+    view.with_field(ScalarField::mean_curvature(field(|c| c.mean), length_unit))
+        .and_then(|v| {
+            v.with_field(ScalarField::gaussian_curvature(field(|c| c.gaussian), length_unit))
+        })
+        .map_err(refused)
 }
 
 fn averaged_normals(positions: &[DVec3], triangles: &[[u32; 3]]) -> Result<Vec<DVec3>, Failure> {

@@ -1,4 +1,5 @@
 //! What a page and its figures consist of, without a browser.
+#![allow(clippy::unwrap_used, clippy::expect_used, reason = "a test may fail by panicking")]
 
 mod common;
 

@@ -6,7 +6,7 @@ use glam::DVec3;
 use report::{FaceGroups, LineSet, Report, ScalarField, SurfaceView};
 
 /// A torus of radii `big` and `small`, oriented outwards, on a grid of `n` x `n` vertices.
-pub fn torus(name: &str, big: f64, small: f64, n: usize) -> SurfaceView {
+pub(crate) fn torus(name: &str, big: f64, small: f64, n: usize) -> SurfaceView {
     let (mut positions, mut normals) = (Vec::new(), Vec::new());
     let (mut h, mut k) = (Vec::new(), Vec::new());
     for index in 0..n * n {
@@ -31,7 +31,7 @@ pub fn torus(name: &str, big: f64, small: f64, n: usize) -> SurfaceView {
 }
 
 /// A report of two tori.
-pub fn tori() -> Report {
+pub(crate) fn tori() -> Report {
     let mut report = Report::new("Two tori", "umbilic analyze torus.ron --threads 2");
     report.length_unit = "m".into();
     report.stages.push(torus("before", 3.0, 1.4, 48));
