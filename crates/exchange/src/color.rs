@@ -42,7 +42,6 @@ pub(crate) fn linear(srgb: f64) -> f64 {
 }
 
 /// The sRGB transfer function, from linear light to display value (IEC 61966-2-1).
-#[cfg(test)]
 pub(crate) fn display(linear: f64) -> f64 {
     if linear <= 0.003_130_8 { linear * 12.92 } else { 1.055 * linear.powf(1.0 / 2.4) - 0.055 }
 }

@@ -15,30 +15,43 @@
 //! ```
 
 mod color;
+mod csv;
+mod drawing;
 mod error;
 mod files;
 mod glb;
+mod json;
 mod mesh;
 mod model;
 mod obj;
+mod off;
+mod ply;
 mod ron_text;
 mod sample;
 mod scene;
 mod step;
+mod stl;
 mod triangulate;
 mod unit;
+mod wrapped;
 
+pub use csv::write_csv;
+pub use drawing::{Drawing, DrawnLine, Label, write_dxf, write_svg};
 pub use error::{ReadError, WriteError};
 pub use files::{check_writable, read_bytes, read_text, write_files};
-pub use glb::write_glb;
+pub use glb::{read_glb, write_glb};
+pub use json::{read_json, write_compas, write_geomdl};
 pub use mesh::{Field, Group, IndexLists, Mesh};
 pub use model::{
     Model, NamedSurface, PointGrid, READABLE, WRITABLE, check_format, decode_model, encode_model,
     extension_of, read_model,
 };
 pub use obj::{read_obj, write_obj};
+pub use off::read_off;
+pub use ply::{read_ply, write_ply};
 pub use ron_text::{from_ron, read_ron, to_ron};
 pub use sample::surface_mesh;
 pub use scene::{read_scene, write_scene};
 pub use step::{read_step, write_step};
+pub use stl::{read_stl, write_stl};
 pub use unit::LengthUnit;

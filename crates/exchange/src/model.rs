@@ -1,13 +1,18 @@
 //! Everything a file can hold, and the choice of reader and writer by extension.
 
+use crate::drawing::{Drawing, DrawnLine, write_dxf, write_svg};
 use crate::error::{ReadError, WriteError};
 use crate::files::{into_text, read_bytes};
-use crate::glb::write_glb;
+use crate::glb::{read_glb, write_glb};
+use crate::json::{read_json, write_compas, write_geomdl};
 use crate::mesh::Mesh;
 use crate::obj::{read_obj, write_obj};
+use crate::off::read_off;
+use crate::ply::{read_ply, write_ply};
 use crate::sample::surface_mesh;
 use crate::scene::{read_scene, write_scene};
 use crate::step::{read_step, write_step};
+use crate::stl::{read_stl, write_stl};
 use crate::unit::LengthUnit;
 use bspline::BsplineSurface;
 use geom_core::DVec3;
@@ -65,6 +70,21 @@ impl Model {
         Self { unit, meshes: vec![mesh], ..Self::default() }
     }
 
+    /// All polylines as a drawing, each mesh on a layer of its name.
+    fn polylines(&self, format: &'static str) -> Result<Drawing, WriteError> {
+        let mut drawing = Drawing::default();
+        for mesh in &self.meshes {
+            for k in 0..mesh.lines.len() {
+                let points = mesh.polyline(k).collect();
+                drawing.lines.push(DrawnLine { layer: mesh.name.clone(), points, closed: false });
+            }
+        }
+        if drawing.lines.is_empty() {
+            return Err(unsupported(format, "a model without polylines"));
+        }
+        Ok(drawing)
+    }
+
     /// The meshes, after sampled meshes of the surfaces.
     fn sampled(&self) -> Cow<'_, [Mesh]> {
         if self.surfaces.is_empty() {
@@ -76,9 +96,9 @@ impl Model {
 }
 
 /// Extensions that [`read_model`] knows.
-pub const READABLE: &str = "ron, step, stp, obj";
+pub const READABLE: &str = "ron, step, stp, obj, ply, off, stl, glb, json";
 /// Extensions that [`encode_model`] knows.
-pub const WRITABLE: &str = "ron, step, stp, obj, glb";
+pub const WRITABLE: &str = "ron, step, stp, obj, ply, stl, glb, json, svg, dxf";
 
 /// Reads any file of geometry, by its extension.
 ///
@@ -100,10 +120,12 @@ pub fn decode_model(extension: &str, bytes: Vec<u8>) -> Result<Model, ReadError>
     match extension {
         "ron" => read_scene(&into_text(bytes)?),
         "step" | "stp" => read_step(&bytes),
-        "obj" => {
-            let (mesh, warnings) = read_obj(&into_text(bytes)?)?;
-            Ok(Model { meshes: vec![mesh], warnings, ..Model::default() })
-        }
+        "obj" => read_obj(&into_text(bytes)?).map(of_mesh),
+        "ply" => read_ply(&bytes),
+        "off" => read_off(&into_text(bytes)?).map(|mesh| of_mesh((mesh, Vec::new()))),
+        "stl" => read_stl(&bytes).map(of_mesh),
+        "glb" => read_glb(&bytes),
+        "json" => read_json(&into_text(bytes)?),
         _ => Err(ReadError::UnknownFormat { extension: extension.into(), known: READABLE }),
     }
 }
@@ -119,6 +141,11 @@ pub fn check_format(path: &Path) -> Result<(), WriteError> {
     } else {
         Err(WriteError::UnknownFormat { extension, known: WRITABLE })
     }
+}
+
+/// `NAME.compas.json` asks for the layout of COMPAS where geomdl's would do.
+fn is_compas(path: &Path) -> bool {
+    path.to_string_lossy().to_lowercase().ends_with(".compas.json")
 }
 
 /// The bytes of a file at `path`, by its extension. Formats without surfaces get sampled meshes
@@ -144,9 +171,31 @@ pub fn encode_model(path: &Path, model: &Model) -> Result<Vec<u8>, WriteError> {
             Ok(write_step(model).into_bytes())
         }
         "obj" => Ok(write_obj(&model.sampled()).into_bytes()),
+        "ply" => Ok(write_ply(&model.sampled(), &model.unit)),
+        "stl" => {
+            let meshes = model.sampled();
+            if meshes.iter().all(|m| m.faces.is_empty()) {
+                return Err(unsupported("STL", "a model without faces"));
+            }
+            Ok(write_stl(&meshes))
+        }
         "glb" => Ok(write_glb(&model.sampled(), &model.unit)),
+        // COMPAS has meshes and surfaces, geomdl surfaces only: the plain one where it suffices.
+        "json" if model.meshes.is_empty() && !model.surfaces.is_empty() && !is_compas(path) => {
+            Ok(write_geomdl(&model.surfaces).into_bytes())
+        }
+        "json" if !model.meshes.is_empty() || is_compas(path) => {
+            Ok(write_compas(model).into_bytes())
+        }
+        "json" => Err(unsupported("JSON", "a model without surfaces and meshes")),
+        "svg" => Ok(write_svg(&model.polylines("SVG")?, &model.unit).into_bytes()),
+        "dxf" => Ok(write_dxf(&model.polylines("DXF")?, &model.unit).into_bytes()),
         _ => Err(WriteError::UnknownFormat { extension, known: WRITABLE }),
     }
+}
+
+fn of_mesh((mesh, warnings): (Mesh, Vec<String>)) -> Model {
+    Model { meshes: vec![mesh], warnings, ..Model::default() }
 }
 
 fn no_meshes(format: &'static str, model: &Model) -> Result<(), WriteError> {

@@ -1,5 +1,5 @@
 //! Wavefront OBJ: polygons with groups, polylines and points. Texture coordinates, normals and
-//! materials are skipped when reading.
+//! materials are skipped when reading; free-form curves of degree 1 are polylines.
 
 use crate::error::ReadError;
 use crate::mesh::{Group, Mesh};
@@ -40,6 +40,7 @@ struct Reader {
     group_ids: HashMap<String, u32>,
     corners: Vec<u32>,
     free_form: Option<usize>,
+    degree_one: bool,
 }
 
 impl Reader {
@@ -54,6 +55,12 @@ impl Reader {
                 self.group = words.collect::<Vec<_>>().join(" ");
                 Ok(())
             }
+            Some("deg") => {
+                self.degree_one = words.next() == Some("1");
+                Ok(())
+            }
+            // A curve of degree 1 is the polyline of its control points, behind two parameters.
+            Some("curv") if self.degree_one => self.line(words.skip(2), number),
             Some("curv" | "surf") => {
                 self.free_form.get_or_insert(number);
                 Ok(())

@@ -1,5 +1,7 @@
 //! Binary glTF 2.0.
 
+mod read;
 mod write;
 
+pub use read::read_glb;
 pub use write::write_glb;

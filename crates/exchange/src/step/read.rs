@@ -5,7 +5,8 @@ use super::parse::{Cursor, Index, Instance};
 use crate::error::ReadError;
 use crate::model::{Model, NamedSurface};
 use crate::unit::LengthUnit;
-use bspline::{BsplineSurface, Degree, KnotVector, SplineError};
+use crate::wrapped::{Direction, unwrap};
+use bspline::{BsplineSurface, Degree, SplineError};
 use geom_core::DVec3;
 use std::collections::BTreeMap;
 
@@ -194,7 +195,8 @@ impl<'a> StepFile<'a> {
         };
         let u = Direction::new(degree_u, knots_u, closed_u, n_u).map_err(refused)?;
         let v = Direction::new(degree_v, knots_v, closed_v, n_v).map_err(refused)?;
-        build(&u, &v, &points, weights.as_deref(), n_v).map_err(refused).map(|s| Some((name, s)))
+        let surface = unwrap(&u, &v, &points, weights.as_deref()).map_err(refused)?;
+        Ok(Some((name, surface)))
     }
 
     /// The unit of the first geometric context.
@@ -392,52 +394,6 @@ fn knots(cursor: &mut Cursor<'_>, multiplicities: &[u32]) -> Result<Vec<f64>, Re
         Ok(())
     })?;
     if count == multiplicities.len() { Ok(knots) } else { Err(wrong(&count.to_string())) }
-}
-
-/// One direction of a surface: knots, and how many different control points there may be.
-struct Direction {
-    knots: KnotVector,
-    /// The same knots as a period, if the file calls the direction closed and they repeat.
-    periodic: Option<KnotVector>,
-    count: usize,
-}
-
-impl Direction {
-    fn new(degree: Degree, knots: Vec<f64>, closed: bool, n: usize) -> Result<Self, SplineError> {
-        let d = degree.get();
-        let open = KnotVector::new(degree, knots)?;
-        let mut periodic = None;
-        if closed && !open.is_clamped() && n > 2 * d {
-            let period = KnotVector::periodic(degree, &open.knots()[d..=n]).ok();
-            periodic = period.filter(|p| p.knots() == open.knots());
-        }
-        Ok(Self { knots: open, periodic, count: n })
-    }
-}
-
-/// The surface, periodic in the directions where the first control points come back at the end.
-fn build(
-    u: &Direction,
-    v: &Direction,
-    points: &[DVec3],
-    weights: Option<&[f64]>,
-    n_v: usize,
-) -> Result<BsplineSurface, SplineError> {
-    let same = |a: usize, b: usize| points[a] == points[b] && weights.is_none_or(|w| w[a] == w[b]);
-    let repeats_u =
-        |n: usize| (n..u.count).all(|i| (0..n_v).all(|j| same(i * n_v + j, (i - n) * n_v + j)));
-    let repeats_v =
-        |n: usize| (0..u.count).all(|i| (n..n_v).all(|j| same(i * n_v + j, i * n_v + j - n)));
-    let pick = |direction: &Direction, repeats: &dyn Fn(usize) -> bool| {
-        let periodic = direction.periodic.clone().filter(|p| repeats(p.control_count()));
-        periodic.unwrap_or_else(|| direction.knots.clone())
-    };
-    let (knots_u, knots_v) = (pick(u, &repeats_u), pick(v, &repeats_v));
-    let (rows, columns) = (knots_u.control_count(), knots_v.control_count());
-    let kept = (0..rows).flat_map(|i| (0..columns).map(move |j| i * n_v + j));
-    let kept_points = kept.clone().map(|k| points[k]).collect();
-    let kept_weights = weights.map(|w| kept.map(|k| w[k]).collect());
-    BsplineSurface::new(knots_u, knots_v, kept_points, kept_weights)
 }
 
 /// Kinds of surfaces with their number, as one line.

@@ -3,6 +3,7 @@
 use super::border::{Border, Side};
 use crate::model::Model;
 use crate::unit::LengthUnit;
+use crate::wrapped::wrapped;
 use bspline::{BsplineSurface, KnotVector};
 use geom_core::{BoundingBox, DVec3};
 use std::fmt::Write;
@@ -253,13 +254,6 @@ impl Borders {
         let closed_v = closed(surface.knots_v(), &sides[2], &sides[3]);
         Self { sides, closed_u, closed_v }
     }
-}
-
-/// Control point numbers as the file lists them: a periodic direction repeats its first ones.
-fn wrapped(knots: &KnotVector) -> Vec<usize> {
-    let n = knots.control_count();
-    let functions = knots.knots().len() - knots.degree().order();
-    (0..functions).map(|i| i % n).collect()
 }
 
 fn knot_lists(knots: &KnotVector) -> (String, String) {
