@@ -7,6 +7,8 @@
 
 mod analyze;
 mod convert;
+mod demo;
+mod weingarten;
 
 use crate::context::Context;
 use crate::failure::Failure;
@@ -42,4 +44,8 @@ commands! {
     analyze::Analyze,
     /// Change the format of surfaces, meshes, curves and points
     convert::Convert,
+    /// Run the main job with no input: a built-in roof becomes a Weingarten surface
+    demo::Demo,
+    /// Optimise a B-spline surface towards a Weingarten surface
+    weingarten::Weingarten,
 }
