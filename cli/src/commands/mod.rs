@@ -6,6 +6,7 @@
 //! files as bytes: `main` writes them together with the metrics and prints the summary.
 
 mod analyze;
+mod asymptotic;
 mod convert;
 mod demo;
 mod weingarten;
@@ -42,6 +43,8 @@ macro_rules! commands {
 commands! {
     /// Measure size and curvatures of surfaces and meshes
     analyze::Analyze,
+    /// Patch or gridshell bounded by asymptotic curves, from corner data or an asymptotic net
+    asymptotic::Asymptotic,
     /// Change the format of surfaces, meshes, curves and points
     convert::Convert,
     /// Run the main job with no input: a built-in roof becomes a Weingarten surface

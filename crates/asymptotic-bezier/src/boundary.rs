@@ -15,6 +15,7 @@ use crate::curve::BezierCurve;
 use crate::data::{AsymptoticNet, DATA_DEGREE};
 use crate::dense::{AffineSpace, Cholesky, Matrix, affine_space, dot};
 use crate::error::{AsymptoticError, AsymptoticWarning};
+use crate::torsion_energy::TorsionCurve;
 use crate::vertex::{VertexFrame, vertex_frames};
 
 /// A coefficient of a torsion equation this small, relative to the curve's size, is no coefficient.
@@ -31,7 +32,7 @@ pub enum BoundaryEnergy {
     Strain,
     /// `Σ ∫ |r‴|² dt`.
     Jerk,
-    /// `Σ L ∫ τ² ds`, started from the strain minimum.
+    /// `Σ L ∫ τ² ds` with the chord `L`, over the corner torsions from the strain minimum.
     Torsion,
 }
 
@@ -161,6 +162,19 @@ pub fn solve_boundary(
             torsions[v] =
                 bilinear_torsion(&net, &signs, frame, v).clamp(bounds[v][0], bounds[v][1]);
         }
+    }
+    if options.energy == BoundaryEnergy::Torsion {
+        let curves: Vec<TorsionCurve> = condensed
+            .iter()
+            .enumerate()
+            .filter(|(i, _)| !net.curves[*i].line)
+            .map(|(i, c)| TorsionCurve {
+                points: c.points.clone(),
+                ends: net.curves[i].ends,
+                signs: signs[i],
+            })
+            .collect();
+        crate::torsion_energy::minimize(&curves, &bounds, &mut torsions);
     }
     let free = bounds.iter().zip(&frames).filter(|(b, f)| f.is_some() && b[0] < b[1]).count();
 

@@ -99,6 +99,12 @@ impl BezierCurve {
         bernstein::eval(&self.points, t)
     }
 
+    /// `segments + 1` points, evenly spaced in the parameter.
+    #[must_use]
+    pub fn polyline(&self, segments: usize) -> Vec<DVec3> {
+        (0..=segments).map(|k| self.position(k as f64 / segments as f64)).collect()
+    }
+
     /// Position and three derivatives at `t`.
     #[must_use]
     pub fn jet(&self, t: f64) -> CurveJet {

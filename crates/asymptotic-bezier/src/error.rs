@@ -125,6 +125,9 @@ pub enum AsymptoticError {
         "the four torsion equations of the quartic quadrilateral have no solution (residual {residual:.3e}); use quintics"
     )]
     QuarticInfeasible { residual: f64 },
+    /// The input file lacks a field or contradicts itself.
+    #[error("{message}")]
+    Data { message: String },
     /// The net is not a net of quads with curves along its edges.
     #[error("net: {message}")]
     Net { message: String },
