@@ -13,8 +13,10 @@
 //! ```
 #![allow(dead_code, reason = "each helper is used by the commands that make such a view")]
 
+pub(crate) mod energies;
 pub(crate) mod jets;
 pub(crate) mod mesh;
+pub(crate) mod weingarten;
 
 use crate::args::ReportArgs;
 use crate::context::Context;

@@ -1,9 +1,12 @@
 //! `umbilic demo [DIR]`.
 
+use crate::args::ReportArgs;
 use crate::commands::weingarten::run;
 use crate::context::Context;
 use crate::failure::Failure;
 use crate::outcome::Outcome;
+use crate::report_support;
+use crate::report_support::weingarten::weingarten_report;
 use exchange::Model;
 use std::path::PathBuf;
 use std::time::Instant;
@@ -29,7 +32,8 @@ impl Demo {
         std::fs::create_dir_all(&self.folder).map_err(|e| {
             Failure::input(&self.folder, format!("the folder cannot be made: {e}; name another"))
         })?;
-        let paths = ["surface.step", "surface.glb", "metrics.json"].map(|n| self.folder.join(n));
+        let paths = ["surface.step", "surface.glb", "metrics.json", "report.html"]
+            .map(|n| self.folder.join(n));
         for path in &paths {
             crate::args::check_output_path(path)?;
         }
@@ -40,12 +44,16 @@ impl Demo {
         let options = WeingartenOptions { levels: LEVELS.to_vec(), ..Default::default() };
         let run = run(&named.surface, &options, None, context).map_err(Failure::other)?;
         let mut outcome = run.outcome(&model.unit)?;
+        let unit = model.unit.to_string();
+        let report = weingarten_report(&named.surface, &run.optimized, &options, &unit)?;
         let result = Model::of_surface("roof", run.optimized.surface, model.unit);
         for path in &paths[..2] {
             let bytes =
                 exchange::encode_model(path, &result).map_err(|e| Failure::input(path, e))?;
             outcome.files.push((path.clone(), bytes));
         }
+        let page = ReportArgs { report: Some(paths[3].clone()), figures: None };
+        report_support::add_files(&mut outcome, &page, context, report)?;
         let seconds = begin.elapsed().as_secs_f64();
         let metrics = outcome.metrics_file("demo", seconds, context.threads);
         outcome.files.push((paths[2].clone(), metrics));

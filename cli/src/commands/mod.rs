@@ -19,6 +19,7 @@ macro_rules! commands {
     ($($(#[$help:meta])* $module:ident :: $command:ident),* $(,)?) => {
         /// What to do.
         #[derive(Debug, clap::Subcommand)]
+        #[allow(clippy::large_enum_variant, reason = "there is one command in a run")]
         pub(crate) enum Command {
             $($(#[$help])* $command($module::$command)),*
         }

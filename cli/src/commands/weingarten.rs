@@ -1,12 +1,14 @@
 //! `umbilic weingarten SURFACE -o OUT`.
 
 use crate::args::{
-    CheckpointArgs, ConfigArgs, ConvergedArgs, Counts, OutputArgs, check_output_path,
+    CheckpointArgs, ConfigArgs, ConvergedArgs, Counts, OutputArgs, ReportArgs, check_output_path,
 };
 use crate::context::Context;
 use crate::failure::Failure;
 use crate::layered;
 use crate::outcome::{Outcome, Status};
+use crate::report_support;
+use crate::report_support::weingarten::weingarten_report;
 use bspline::BsplineSurface;
 use exchange::{LengthUnit, Model, NamedSurface};
 use serde::{Deserialize, Deserializer, Serialize};
@@ -38,6 +40,8 @@ pub(crate) struct Weingarten {
     checkpoint: CheckpointArgs,
     #[command(flatten)]
     converged: ConvergedArgs,
+    #[command(flatten)]
+    report: ReportArgs,
 }
 
 /// Options of the method, from flags or the configuration file.
@@ -102,6 +106,7 @@ layered!(Settings {
 impl Weingarten {
     pub(crate) fn run(self, context: &Context) -> Result<Outcome, Failure> {
         self.output.check()?;
+        self.report.check()?;
         if let Some(path) = &self.checkpoint.checkpoint {
             check_output_path(path)?;
         }
@@ -113,6 +118,13 @@ impl Weingarten {
         let mut outcome = run.outcome(&model.unit)?.with_input(&self.input);
         outcome.warnings = model.warnings;
         outcome.require_converged = self.converged.require_converged;
+        let report = match self.report.wanted() {
+            true => {
+                let unit = model.unit.to_string();
+                Some(weingarten_report(&named.surface, &run.optimized, &options, &unit)?)
+            }
+            false => None,
+        };
         let result = Model::of_surface(&named.name, run.optimized.surface, model.unit);
         for path in self.output.output {
             let bytes =
@@ -122,6 +134,9 @@ impl Weingarten {
         if let (Some(path), Some(state)) = (self.checkpoint.checkpoint, run.checkpoint) {
             let bytes = serde_json::to_vec(&state).map_err(Failure::other)?;
             outcome.checkpoint = Some((path, bytes));
+        }
+        if let Some(report) = report {
+            report_support::add_files(&mut outcome, &self.report, context, report)?;
         }
         Ok(outcome)
     }

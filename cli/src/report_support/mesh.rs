@@ -37,6 +37,9 @@ pub(crate) fn mesh_view(
     let mut view = SurfaceView::new(name, mesh.positions.clone(), normals, triangles)
         .and_then(|v| v.with_lines(LineSet::new("edges", "mesh edges", LineRole::Mesh, edges)))
         .map_err(refused)?;
+    if mesh.normals.is_empty() {
+        view = view.with_averaged_normals();
+    }
     if !mesh.lines.is_empty() {
         let curves = (0..mesh.lines.len()).map(|k| mesh.polyline(k).collect()).collect();
         let mut set = LineSet::new("curves", "curves", LineRole::Curves, curves);
@@ -70,11 +73,11 @@ fn with_estimated_curvatures(
     let field = |of: fn(&VertexCurvature) -> f64| -> Vec<f64> {
         fitted.iter().map(|c| c.as_ref().map_or(f64::NAN, of)).collect()
     };
-    view.with_field(ScalarField::mean_curvature(field(|c| c.mean), length_unit))
-        .and_then(|v| {
-            v.with_field(ScalarField::gaussian_curvature(field(|c| c.gaussian), length_unit))
-        })
-        .map_err(refused)
+    let mut mean = ScalarField::mean_curvature(field(|c| c.mean), length_unit);
+    let mut gaussian = ScalarField::gaussian_curvature(field(|c| c.gaussian), length_unit);
+    mean.label += ", estimated";
+    gaussian.label += ", estimated";
+    view.with_field(mean).and_then(|v| v.with_field(gaussian)).map_err(refused)
 }
 
 fn averaged_normals(positions: &[DVec3], triangles: &[[u32; 3]]) -> Result<Vec<DVec3>, Failure> {

@@ -25,7 +25,8 @@ pub(crate) fn energies_svg(history: &EnergyHistory) -> String {
     let (right, base) = (WIDTH - RIGHT, HEIGHT - BOTTOM);
     let x_of = |i: f64| LEFT + (right - LEFT) * i / steps as f64;
     let y_of = |v: f64| {
-        let log = if v > 0.0 && v.is_finite() { v.log10().max(floor) } else { floor };
+        // Zero lies on the axis; what is not a number lies nowhere.
+        let log = if v > 0.0 { v.log10().max(floor) } else { floor + 0.0 * v };
         base - (base - TOP) * (log - floor) / (ceiling - floor)
     };
 
@@ -53,8 +54,13 @@ pub(crate) fn energies_svg(history: &EnergyHistory) -> String {
         let colour = SERIES[(k + 1) % SERIES.len()];
         let points: Vec<[f64; 2]> =
             term.values.iter().enumerate().map(|(i, v)| [x_of(i as f64), y_of(*v)]).collect();
-        svg.polyline(&points, colour, 1.8);
-        if let (Some(end), Some(value)) = (points.last(), term.values.last()) {
+        // The line is broken where the term does not exist.
+        let exists = |p: &[f64; 2]| p[1].is_finite();
+        for piece in points.chunk_by(|a, b| exists(a) == exists(b)).filter(|p| exists(&p[0])) {
+            svg.polyline(piece, colour, 1.8);
+        }
+        let ends = points.iter().zip(&term.values).rfind(|(p, _)| exists(p));
+        if let Some((end, value)) = ends {
             svg.dots(&[*end], colour, 5.0);
             labels.push((end[1], colour, format!("{} {}", term.name, format_number(*value, 3))));
         }
@@ -107,6 +113,14 @@ mod tests {
         let terms = vec![Series { name: "e".into(), values: vec![0.0, 0.0] }];
         let svg = energies_svg(&EnergyHistory { terms, marks: vec![] });
         assert!(!svg.contains("NaN") && !svg.contains("inf"));
+    }
+
+    #[test]
+    fn a_term_may_begin_later() {
+        let values = vec![f64::NAN, f64::NAN, 1.0, 0.1];
+        let terms = vec![Series { name: "late".into(), values }];
+        let svg = energies_svg(&EnergyHistory { terms, marks: vec![] });
+        assert!(svg.contains("late 0.1") && !svg.contains("NaN"));
     }
 
     #[test]

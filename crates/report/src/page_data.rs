@@ -66,7 +66,7 @@ fn pack_stage(view: &SurfaceView) -> (Value, String) {
         }));
     }
     let stage = json!({
-        "name": view.name(), "positions": positions, "normals": normals, "triangles": triangles,
+        "name": view.name(), "exactNormals": view.has_exact_normals(), "positions": positions, "normals": normals, "triangles": triangles,
         "fields": fields, "groups": groups, "lines": lines,
     });
     (stage, packer.into_text())

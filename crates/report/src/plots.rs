@@ -48,7 +48,8 @@ pub struct Series {
 /// Energy of every term at every iteration.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct EnergyHistory {
-    /// Terms with their value before the first iteration and after each.
+    /// Terms with their value before the first iteration and after each; NaN where a term does not
+    /// exist.
     pub terms: Vec<Series>,
     /// Where something changed, such as a new resolution: iteration and its name.
     pub marks: Vec<(usize, String)>,

@@ -18,6 +18,7 @@ pub struct SurfaceView {
     name: String,
     positions: Vec<DVec3>,
     normals: Vec<DVec3>,
+    has_exact_normals: bool,
     triangles: Vec<[u32; 3]>,
     fields: Vec<ScalarField>,
     groups: Vec<FaceGroups>,
@@ -59,7 +60,8 @@ impl SurfaceView {
             }
         }
         let (fields, groups, lines) = (Vec::new(), Vec::new(), Vec::new());
-        Ok(Self { name, positions, normals, triangles, fields, groups, lines })
+        let has_exact_normals = true;
+        Ok(Self { name, positions, normals, has_exact_normals, triangles, fields, groups, lines })
     }
 
     /// Triangles of a grid of `rows` x `columns` vertices, vertex `i * columns + j`.
@@ -78,6 +80,13 @@ impl SurfaceView {
             }
         }
         triangles
+    }
+
+    /// Says that the normals were averaged from faces, so that the page does not call them exact.
+    #[must_use]
+    pub fn with_averaged_normals(mut self) -> Self {
+        self.has_exact_normals = false;
+        self
     }
 
     /// Adds a scalar field with one value per vertex; NaN marks a singular point.
@@ -138,6 +147,11 @@ impl SurfaceView {
     /// Unit normals of the surface, one per vertex.
     pub fn normals(&self) -> &[DVec3] {
         &self.normals
+    }
+
+    /// Whether the normals are those of the surface, not averages over faces.
+    pub fn has_exact_normals(&self) -> bool {
+        self.has_exact_normals
     }
 
     /// Vertex numbers of the triangles.

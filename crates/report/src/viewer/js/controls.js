@@ -97,7 +97,10 @@ function makeControls(app) {
   });
   byId("clear-brush").addEventListener("click", () => app.clearBrush());
   for (const button of document.querySelectorAll("[data-seam]")) {
-    button.addEventListener("click", () => app.showSeam(Number(button.dataset.seam)));
+    button.addEventListener("click", () => {
+      app.showSeam(Number(button.dataset.seam));
+      byId("view3d").scrollIntoView({ block: "center" });
+    });
   }
   window.addEventListener("keydown", (event) => {
     if (event.key === "Escape") app.clearBrush();

@@ -16,7 +16,7 @@ function drawLegend(node, app) {
   const parts = [];
   if (state.mode === "field") {
     const field = look.everywhere(state.field)[0];
-    if (field) parts.push(...colourBar(app, stage, field, data.maps[field.signed ? "signed" : "magnitude"]));
+    if (field) parts.push(...colourBar(app, field, data.maps[field.signed ? "signed" : "magnitude"]));
   } else if (state.mode === "groups") {
     const group = stage.groups.find((g) => g.id === state.group);
     if (group) {
@@ -28,7 +28,7 @@ function drawLegend(node, app) {
     }
   } else if (state.mode !== "plain") {
     const name = state.mode === "zebra" ? "Zebra stripes" : "Isophotes";
-    parts.push(element("h3", {}, name), element("p", { class: "quiet" }, "shaded from the surface's exact normals"));
+    parts.push(element("h3", {}, name), element("p", { class: "quiet" }, stage.exactNormals ? "shaded from the surface's exact normals" : "shaded from normals averaged at the vertices"));
   }
   state.iso.forEach((id, k) => {
     const step = look.isoStep(id, app.shown());
@@ -44,7 +44,7 @@ function drawLegend(node, app) {
 
 const shortName = (id) => ({ kappa1: "κ₁", kappa2: "κ₂" })[id] ?? id;
 
-function colourBar(app, stage, field, map) {
+function colourBar(app, field, map) {
   const { state, look } = app;
   const range = state.range ?? look.autoRange(field.id, app.shown());
   const height = 190;
@@ -52,7 +52,7 @@ function colourBar(app, stage, field, map) {
   const stops = Array.from({ length: 17 }, (_, i) => map[Math.round((i / 16) * 255)]);
   bar.append(element("div", { class: "ramp", style: `background:linear-gradient(to top, ${stops.join(",")})` }));
   // How the area is spread over the values.
-  const density = look.density(stage, field.id, range, 48);
+  const density = look.density(state.stage, field.id, range, 48);
   const most = Math.max(...density);
   const svg = element("svg", { class: "density", width: 26, height, "aria-hidden": "true" });
   if (most > 0) {
@@ -67,12 +67,10 @@ function colourBar(app, stage, field, map) {
   const title = element("h3", {}, field.label);
   const unit = element("p", { class: "quiet" }, field.unit ? `in ${field.unit}` : "no unit");
   const parts = [title, unit, bar];
-  const values = stage.fields.find((f) => f.id === field.id)?.values;
-  if (values) {
-    const own = sortedFinite([values]);
-    const [lo, hi] = [own[0], own[own.length - 1]];
-    parts.push(element("p", { class: "quiet" }, `from ${formatNumber(lo)} to ${formatNumber(hi)}`));
-    if (own.length < values.length && values.length < 50000) parts.push(element("p", { class: "quiet" }, "grey: no value"));
+  const own = look.extremes(state.stage, field.id);
+  if (own) {
+    parts.push(element("p", { class: "quiet" }, `from ${formatNumber(own.lo)} to ${formatNumber(own.hi)}`));
+    if (own.gaps) parts.push(element("p", { class: "quiet" }, "grey: no value"));
   } else {
     parts.push(element("p", { class: "quiet" }, "not known for this stage"));
   }

@@ -40,14 +40,31 @@ function makeLook(stages, lengthUnit) {
   }
 
   // Share of the area in each of `bins` equal parts of the range.
-  function density(stage, id, range, bins) {
-    const out = new Float64Array(bins);
-    const field = stage.fields.find((f) => f.id === id);
-    field?.values.forEach((v, i) => {
-      const k = Math.floor(((v - range[0]) / (range[1] - range[0])) * bins);
-      if (k >= 0 && k < bins) out[k] += stage.areas[i];
+  function density(index, id, range, bins) {
+    return remember(`density ${index} ${id} ${range.join()}`, () => {
+      const out = new Float64Array(bins);
+      const field = stages[index].fields.find((f) => f.id === id);
+      field?.values.forEach((v, i) => {
+        const k = Math.floor(((v - range[0]) / (range[1] - range[0])) * bins);
+        if (k >= 0 && k < bins) out[k] += stages[index].areas[i];
+      });
+      return out;
     });
-    return out;
+  }
+
+  // Lowest and highest value in one stage, and whether some vertices have none.
+  function extremes(index, id) {
+    return remember(`extremes ${index} ${id}`, () => {
+      const values = stages[index].fields.find((f) => f.id === id)?.values;
+      if (!values) return null;
+      let [lo, hi, gaps] = [Infinity, -Infinity, false];
+      for (const v of values) {
+        if (!Number.isFinite(v)) gaps = true;
+        if (v < lo) lo = v;
+        if (v > hi) hi = v;
+      }
+      return { lo, hi, gaps };
+    });
   }
 
   // Part of the diagram's plane that holds nearly all points of the given stages.
@@ -71,7 +88,7 @@ function makeLook(stages, lengthUnit) {
     });
   }
 
-  return { autoRange, isoStep, density, diagramWindow, everywhere, sorted, diagonal, lengthUnit };
+  return { autoRange, isoStep, density, extremes, diagramWindow, everywhere, sorted, diagonal, lengthUnit };
 }
 
 function boxDiagonal(positions) {

@@ -16,6 +16,7 @@ function readStage(about, bytes, origin) {
   };
   const stage = {
     name: about.name,
+    exactNormals: about.exactNormals,
     count: split.source.length,
     positions: pick3(positions),
     normals: pick3(decodeNormals(bytes, about.normals)),
