@@ -156,8 +156,10 @@ fn summary(
     let mut row = |name: &str, range: Option<ValueRange>, power: &str| {
         if let Some(r) = range {
             lines.push(format!(
-                "  {name} from {:.6} to {:.6}, mean size {:.6} 1/{unit}{power}",
-                r.min, r.max, r.mean_abs
+                "  {name} from {} to {}, mean size {} 1/{unit}{power}",
+                number(r.min),
+                number(r.max),
+                number(r.mean_abs)
             ));
         }
     };
@@ -165,4 +167,9 @@ fn summary(
     row("Gaussian curvature ", statistics.gaussian_curvature(), "²");
     row("principal curvature", statistics.principal_curvature(), "");
     lines
+}
+
+/// Six decimals, or powers of ten beside a pole.
+fn number(x: f64) -> String {
+    if x.abs() < 1e6 { format!("{x:.6}") } else { format!("{x:.5e}") }
 }

@@ -9,6 +9,7 @@ use std::path::PathBuf;
 
 /// Arguments of `convert`.
 #[derive(Debug, clap::Args)]
+#[command(after_help = "Example: umbilic convert fixtures/roof.ron roof.step")]
 pub(crate) struct Convert {
     /// File to read
     input: PathBuf,

@@ -10,6 +10,7 @@ mod asymptotic;
 mod convert;
 mod demo;
 mod weingarten;
+mod fit;
 
 use crate::context::Context;
 use crate::failure::Failure;
@@ -52,4 +53,6 @@ commands! {
     demo::Demo,
     /// Optimise a B-spline surface towards a Weingarten surface
     weingarten::Weingarten,
+    /// Fit a B-spline surface to a quad mesh or a grid of points
+    fit::Fit,
 }

@@ -13,6 +13,7 @@ mod jet;
 mod least_squares;
 mod mesh_curvature;
 mod poly_mesh;
+mod quad_grid;
 mod third_order;
 mod tri_mesh;
 
@@ -31,5 +32,6 @@ pub use jet::SurfaceJet;
 pub use least_squares::{RANK_RATIO, RankError, least_squares};
 pub use mesh_curvature::{VertexCurvature, mesh_curvature_statistics, vertex_curvatures};
 pub use poly_mesh::{FaceId, HalfEdgeId, MeshError, PolyMesh, VertexId};
+pub use quad_grid::{GridError, QuadGrid};
 pub use third_order::{ThirdOrder, UmbilicKind};
 pub use tri_mesh::{ClosestPoint, Foot, Nearest, TriMesh, closest_barycentric, closest_on_segment};

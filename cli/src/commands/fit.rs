@@ -1,0 +1,164 @@
+//! `umbilic fit MESH|POINTS -o SURFACE`.
+
+use crate::args::{ConfigArgs, Counts, OutputArgs};
+use crate::context::Context;
+use crate::failure::Failure;
+use crate::outcome::{Outcome, Status};
+use bspline::{Degree, GridFit, GridFitOptions, fit_grid};
+use exchange::Model;
+use geom_core::{BoundingBox, DVec3, QuadGrid};
+use serde::{Deserialize, Serialize};
+use std::path::PathBuf;
+
+/// Arguments of `fit`.
+#[derive(Debug, clap::Args)]
+#[command(after_help = "Example: umbilic fit fixtures/grid.obj -o fitted.step --tolerance 0.001")]
+pub(crate) struct Fit {
+    /// Quad mesh like a grid or a tube, or a RON scene with a point grid
+    input: PathBuf,
+    #[command(flatten)]
+    output: OutputArgs,
+    #[command(flatten)]
+    config: ConfigArgs,
+    #[command(flatten)]
+    options: Options,
+}
+
+/// Options of the method.
+#[derive(Debug, Default, clap::Args, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+struct Options {
+    /// Numbers of control points (default: as few as meet the tolerance)
+    #[arg(long, value_name = "UxV")]
+    ctrl: Option<Counts>,
+    /// Degree in both directions, 1 to 15 (default: 4)
+    #[arg(long, value_name = "N")]
+    degree: Option<usize>,
+    /// Largest distance of a point to the surface (default: 0.1 % of the diagonal)
+    #[arg(long, value_name = "L")]
+    tolerance: Option<f64>,
+}
+
+crate::layered!(Options { ctrl, degree, tolerance });
+
+/// The points to fit, row by row.
+struct Points {
+    points: Vec<DVec3>,
+    n_u: usize,
+    n_v: usize,
+    closed_u: bool,
+}
+
+impl Fit {
+    pub(crate) fn run(self, _context: &Context) -> Result<Outcome, Failure> {
+        self.output.check()?;
+        let options = self.options.over(self.config.load()?);
+        let settings = settings(&options)?;
+        let model =
+            exchange::read_model(&self.input).map_err(|e| Failure::input(&self.input, e))?;
+        let data = points(&model).map_err(|e| Failure::input(&self.input, e))?;
+        let fit = fit_grid(&data.points, data.n_u, data.n_v, data.closed_u, &settings)
+            .map_err(|e| Failure::input(&self.input, e))?;
+        let within = fit.distance_max <= fit.tolerance;
+        let status = if within { Status::Converged } else { Status::Infeasible };
+        let metrics = FitMetrics::new(&fit, &data.points);
+        let mut outcome = Outcome::new(status, 0).with_input(&self.input).with_metrics(&metrics)?;
+        let unit = &model.unit;
+        outcome.summary = vec![
+            format!(
+                "{}: {} x {} control points of degree {} through {} x {} points",
+                self.input.display(),
+                fit.surface.n_u(),
+                fit.surface.n_v(),
+                fit.surface.degree_u(),
+                data.n_u,
+                data.n_v
+            ),
+            format!(
+                "  distance mean {:.3e}, rms {:.3e}, max {:.3e} {unit} ({:.4} % of the diagonal)",
+                fit.distance_mean, fit.distance_rms, fit.distance_max, metrics.distance_max_percent
+            ),
+        ];
+        outcome.warnings = model.warnings;
+        if !within {
+            let tolerance = fit.tolerance;
+            outcome.warnings.push(format!(
+                "the distance exceeds the tolerance of {tolerance:.3e} {unit}; ask for more control points"
+            ));
+        }
+        let name = self.input.file_stem().map(|s| s.to_string_lossy().into_owned());
+        let fitted = Model::of_surface(&name.unwrap_or_default(), fit.surface, model.unit);
+        for path in self.output.output {
+            let bytes =
+                exchange::encode_model(&path, &fitted).map_err(|e| Failure::input(&path, e))?;
+            outcome.files.push((path, bytes));
+        }
+        Ok(outcome)
+    }
+}
+
+fn settings(options: &Options) -> Result<GridFitOptions, Failure> {
+    let degree = options.degree.map(Degree::new).transpose();
+    if let Some(tolerance) = options.tolerance.filter(|t| !(t.is_finite() && *t > 0.0)) {
+        return Err(Failure::usage(format!(
+            "--tolerance {tolerance}: a tolerance is a positive length; give one"
+        )));
+    }
+    Ok(GridFitOptions {
+        degree: degree.map_err(|e| Failure::usage(format!("--degree: {e}")))?,
+        control_points: options.ctrl.map(|counts| (counts.u, counts.v)),
+        tolerance: options.tolerance,
+    })
+}
+
+fn points(model: &Model) -> Result<Points, String> {
+    if let Some(grid) = model.grids.first() {
+        let (points, n_u, n_v) = (grid.points.clone(), grid.n_u, grid.n_v);
+        if n_u < 2 || n_v < 2 {
+            return Err(format!("the grid has {n_u} x {n_v} points; a surface needs 2 x 2"));
+        }
+        return Ok(Points { points, n_u, n_v, closed_u: false });
+    }
+    let mesh = model.meshes.iter().find(|m| !m.faces.is_empty());
+    let Some(mesh) = mesh else {
+        return Err("the file has no faces and no point grid; give it one of them".to_owned());
+    };
+    let mesh = mesh.to_poly_mesh().map_err(|e| e.to_string())?;
+    let grid = QuadGrid::of(&mesh).map_err(|e| e.to_string())?;
+    let points = grid.vertices.iter().map(|v| mesh.position(*v)).collect();
+    Ok(Points { points, n_u: grid.n_u, n_v: grid.n_v, closed_u: grid.closed_u })
+}
+
+/// The `metrics` object; distances from the points to their foot points, in the model's unit.
+#[derive(Serialize)]
+struct FitMetrics {
+    points: usize,
+    control_points: usize,
+    control_points_u: usize,
+    control_points_v: usize,
+    degree: usize,
+    tolerance: f64,
+    distance_mean: f64,
+    distance_rms: f64,
+    distance_max: f64,
+    distance_max_percent: f64,
+}
+
+impl FitMetrics {
+    fn new(fit: &GridFit, points: &[DVec3]) -> Self {
+        let diagonal = BoundingBox::of(points.iter().copied()).map_or(0.0, BoundingBox::diagonal);
+        let (n_u, n_v) = (fit.surface.n_u(), fit.surface.n_v());
+        Self {
+            points: points.len(),
+            control_points: n_u * n_v,
+            control_points_u: n_u,
+            control_points_v: n_v,
+            degree: fit.surface.degree_u().get(),
+            tolerance: fit.tolerance,
+            distance_mean: fit.distance_mean,
+            distance_rms: fit.distance_rms,
+            distance_max: fit.distance_max,
+            distance_max_percent: 100.0 * fit.distance_max / diagonal,
+        }
+    }
+}
