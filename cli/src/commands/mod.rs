@@ -9,8 +9,8 @@ mod analyze;
 mod asymptotic;
 mod convert;
 mod demo;
-mod weingarten;
 mod fit;
+mod weingarten;
 
 use crate::context::Context;
 use crate::failure::Failure;
@@ -51,8 +51,8 @@ commands! {
     convert::Convert,
     /// Run the main job with no input: a built-in roof becomes a Weingarten surface
     demo::Demo,
-    /// Optimise a B-spline surface towards a Weingarten surface
-    weingarten::Weingarten,
     /// Fit a B-spline surface to a quad mesh or a grid of points
     fit::Fit,
+    /// Optimise a B-spline surface towards a Weingarten surface
+    weingarten::Weingarten,
 }
