@@ -1,0 +1,67 @@
+//! Why a paneling was refused.
+
+/// Why a paneling was refused.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+#[expect(missing_docs, reason = "the messages spell out every field")]
+pub enum PanelingError {
+    /// A layout with no panels in one direction.
+    #[error("a layout of {u} x {v} panels has none; ask for at least 1 x 1")]
+    NoPanels { u: usize, v: usize },
+    /// More panels than can be held.
+    #[error("{panels} panels are more than {limit}; ask for fewer")]
+    TooManyPanels { panels: usize, limit: usize },
+    /// Too few panels to close the layout around the surface.
+    #[error(
+        "a surface closed in {direction} needs at least {needed} panels there, found {found}; ask for more"
+    )]
+    TooFewAround { direction: &'static str, needed: usize, found: usize },
+    /// A pattern whose rows must come in pairs around a closed surface.
+    #[error(
+        "this layout needs an even number of panels around the closed direction {direction}, found {found}"
+    )]
+    OddAround { direction: &'static str, found: usize },
+    /// A layout mesh that is not in the plane z = 0.
+    #[error(
+        "layout vertex {vertex} has z = {z}; the layout is a mesh in the plane z = 0 over the unit square"
+    )]
+    NotPlanar { vertex: usize, z: f64 },
+    /// A layout mesh that leaves the unit square.
+    #[error(
+        "layout vertex {vertex} at ({u}, {v}) is outside the unit square, which stands for the whole surface; scale the layout"
+    )]
+    OutsideDomain { vertex: usize, u: f64, v: f64 },
+    /// A layout face that overlaps itself or is turned over.
+    #[error(
+        "layout face {face} is not a simple polygon of positive area; mend it in the layout file"
+    )]
+    BadFace { face: usize },
+    /// Two layout faces that overlap.
+    #[error("layout faces {first} and {second} overlap; every place belongs to one panel only")]
+    Overlap { first: usize, second: usize },
+    /// A mesh edge with more than two faces.
+    #[error("layout edge {from}-{to} has more than two faces; split the layout there")]
+    NonManifold { from: usize, to: usize },
+    /// More molds than panels.
+    #[error("{molds} molds for {panels} panels; ask for at most one per panel, and at least one")]
+    MoldCount { molds: usize, panels: usize },
+    /// The surface has no normal inside a panel.
+    #[error(
+        "the surface is singular at ({u}, {v}), inside panel {panel}; cut the pole off or move its control points apart"
+    )]
+    Singular { panel: usize, u: f64, v: f64 },
+    /// A bound that no paneling can be measured against.
+    #[error("{name} is {value}; it must be positive and finite")]
+    BadOption { name: &'static str, value: f64 },
+    /// No type of mold was allowed.
+    #[error(
+        "no mold type is allowed; name at least one of plane, cylinder, sphere, paraboloid, torus, cubic"
+    )]
+    NoMoldTypes,
+    /// A price list without a type that is allowed.
+    #[error("the price list has no entry for {kind}; add it or leave that type out")]
+    NoPrice { kind: &'static str },
+    /// A price that is not a number or below zero.
+    #[error("the price of {kind} is {value}; prices must be finite and not negative")]
+    BadPrice { kind: &'static str, value: f64 },
+}
