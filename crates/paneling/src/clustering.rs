@@ -166,6 +166,64 @@ pub(crate) fn shapes(features: &[Feature], count: usize, iterations: usize) -> C
     }
 }
 
+/// Most shapes that are considered as molds by [`cover`].
+const MAX_CANDIDATES: usize = 2000;
+
+/// Greedy covering: the shapes of some panels become molds such that every panel is within a
+/// tolerance of one, and the tolerance is the smallest for which `count` suffice.
+pub(crate) fn cover(features: &[Feature], count: usize) -> Clusters {
+    let n = features.len();
+    let step = n.div_ceil(MAX_CANDIDATES);
+    let candidates: Vec<Feature> = features.iter().copied().step_by(step).collect();
+    let distances: Vec<Vec<f64>> = candidates
+        .par_iter()
+        .map(|c| features.iter().map(|x| distance(x, c).0).collect())
+        .collect();
+    let chosen = |tolerance: f64| -> Option<Vec<usize>> {
+        let mut open = vec![true; n];
+        let mut left = n;
+        let mut chosen = Vec::new();
+        while left > 0 {
+            if chosen.len() == count {
+                return None;
+            }
+            let gain = |row: &Vec<f64>| {
+                row.iter().zip(&open).filter(|(d, open)| **open && **d <= tolerance).count()
+            };
+            let gains: Vec<usize> = distances.par_iter().map(gain).collect();
+            let best = (0..gains.len()).max_by_key(|&c| (gains[c], usize::MAX - c))?;
+            if gains[best] == 0 {
+                return None;
+            }
+            for p in 0..n {
+                if open[p] && distances[best][p] <= tolerance {
+                    open[p] = false;
+                    left -= 1;
+                }
+            }
+            chosen.push(best);
+        }
+        Some(chosen)
+    };
+    let (mut low, mut high) = (0.0, distances.iter().flatten().copied().fold(0.0, f64::max));
+    let mut centers = chosen(high).unwrap_or_else(|| vec![0]);
+    for _ in 0..24 {
+        let middle = 0.5 * (low + high);
+        match chosen(middle) {
+            Some(found) => (centers, high) = (found, middle),
+            None => low = middle,
+        }
+    }
+    let centers: Vec<Feature> = centers.iter().map(|&c| candidates[c]).collect();
+    let mut nearest = assign(features, &centers);
+    fill_empty(&mut nearest, centers.len());
+    Clusters {
+        labels: nearest.iter().map(|x| x.0).collect(),
+        turned: nearest.iter().map(|x| x.2).collect(),
+        count: centers.len(),
+    }
+}
+
 /// The nearest center of every shape.
 fn assign(features: &[Feature], centers: &[Feature]) -> Vec<(usize, f64, bool)> {
     features

@@ -25,7 +25,7 @@ pub(crate) struct Fit {
 }
 
 /// A round that lowers the energy by less than this share ends the alternation.
-const STALL: f64 = 2e-3;
+pub(crate) const STALL: f64 = 2e-3;
 /// Gauss-Newton steps of a registration per round.
 const REGISTRATION_STEPS: usize = 2;
 /// Damping of a registration, a share of the mean diagonal.
@@ -102,6 +102,30 @@ impl Fit {
             }
         }
         history
+    }
+
+    /// Gives a mold another type and starts its panels afresh from their principal frames.
+    pub(crate) fn restart(&mut self, set: &PanelSet, m: usize, kind: MoldType) {
+        for &p in &self.members[m] {
+            self.poses[p] = set.frames[p];
+        }
+        self.molds[m] = first_mold(set, &self.members[m], kind, &mut self.poses);
+    }
+
+    /// Splits a mold in two equal ones; `halves` says for each of its panels whether it stays (0)
+    /// or moves to the new mold (1).
+    pub(crate) fn split(&mut self, m: usize, halves: &[usize]) {
+        let fresh = self.molds.len();
+        let (stay, leave): (Vec<_>, Vec<_>) =
+            self.members[m].iter().zip(halves).partition(|(_, half)| **half == 0);
+        let panels = |list: Vec<(&usize, &usize)>| list.into_iter().map(|(p, _)| *p).collect();
+        let (stay, leave): (Vec<usize>, Vec<usize>) = (panels(stay), panels(leave));
+        for &p in &leave {
+            self.labels[p] = fresh;
+        }
+        self.molds.push(self.molds[m]);
+        self.members[m] = stay;
+        self.members.push(leave);
     }
 
     /// One Gauss-Newton step of every mold's parameters (exact where these are linear).

@@ -327,13 +327,13 @@ fn diagonals(u: usize, v: usize, closed: [bool; 2]) -> Builder {
             if east {
                 corners.push([x + 1, y]);
             }
-            if !(east && north) && !corners.contains(&[x, y]) {
+            if !(corners.contains(&[x, y]) || east && north) {
                 corners.push([x, y]);
             }
             if north {
                 corners.push([x, y + 1]);
             }
-            if !(north && west) && !corners.contains(&[x, y]) {
+            if !(corners.contains(&[x, y]) || north && west) {
                 corners.push([x, y]);
             }
             if west {

@@ -15,7 +15,7 @@ pub enum MoldType {
     /// `z = a x² + b y²`.
     Paraboloid,
     /// A torus around its equator, axis along y: curvature of the equator (in x) and of the
-    /// generating circle (in y).
+    /// generating circle (in y). Panels can slide along the tube as long as it is not vertical.
     Torus,
     /// A cubic polynomial without constant and linear terms.
     Cubic,
@@ -54,6 +54,17 @@ impl MoldType {
             Self::Paraboloid | Self::Torus => 2,
             Self::Cubic => 7,
         }
+    }
+}
+
+impl std::str::FromStr for MoldType {
+    type Err = String;
+
+    fn from_str(name: &str) -> Result<Self, String> {
+        Self::from_name(name).ok_or_else(|| {
+            let known = Self::ALL.map(Self::name).join(", ");
+            format!("unknown mold type `{name}`; use {known}")
+        })
     }
 }
 

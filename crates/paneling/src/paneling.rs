@@ -1,11 +1,12 @@
 //! From a set of panels to molds, poses and measures.
 
-use crate::clustering::{self, Clusters, DiagramAxis};
+use crate::clustering::{self, Clusters, DiagramAxis, Feature};
 use crate::error::PanelingError;
 use crate::fit::Fit;
 use crate::measure::{Measures, measure};
 use crate::mold::{Mold, MoldType};
 use crate::panels::{PanelSet, Pose};
+use crate::prices::PriceList;
 use crate::seam_step::{self, SeamOptions};
 
 /// How panels are grouped by mold.
@@ -16,6 +17,10 @@ pub enum Clustering {
     Own,
     /// The published grid over the curvature diagram; uses at most the wanted number.
     Grid(DiagramAxis),
+    /// Greedy covering as in the assignment of Eigensatz et al. 2010, restricted to one type of
+    /// mold: the fewest shapes that are near enough to every panel, where "near enough" is as
+    /// tight as the wanted number of molds allows.
+    Cover,
 }
 
 /// Settings of a paneling.
@@ -49,6 +54,15 @@ impl Options {
             seam_steps: 8,
         }
     }
+
+    pub(crate) fn seam_settings(&self) -> SeamOptions {
+        SeamOptions {
+            steps: self.seam_steps,
+            gap_weight: 1.0,
+            design_weight: 0.1,
+            stall: SEAM_STALL,
+        }
+    }
 }
 
 /// The number of molds for `panels` panels by the rule `k √N` of Pellis et al. 2021, Sec. 4.2.
@@ -80,6 +94,34 @@ pub struct Paneling {
     pub seam_history: Vec<f64>,
 }
 
+impl Paneling {
+    /// Total cost of molds and panels.
+    #[must_use]
+    pub fn cost(&self, prices: &PriceList) -> f64 {
+        let mut counts = vec![0; self.molds.len()];
+        self.labels.iter().for_each(|&m| counts[m] += 1);
+        self.molds.iter().zip(counts).map(|(m, n)| prices.cost(m.kind, n)).sum()
+    }
+
+    /// Whether the last phase ended because its last step lowered the energy by less than its
+    /// stop rule asks, and not because its steps were used up.
+    #[must_use]
+    pub fn has_settled(&self) -> bool {
+        let (history, stall) = if self.seam_history.is_empty() {
+            (&self.fit_history, crate::fit::STALL)
+        } else {
+            (&self.seam_history, SEAM_STALL)
+        };
+        match history[..] {
+            [.., before, after] => after >= (1.0 - stall) * before,
+            _ => true,
+        }
+    }
+}
+
+/// A seam step that lowers the energy by less than this share is the last.
+const SEAM_STALL: f64 = 1e-2;
+
 /// Clusters the panels, fits molds and poses, and measures the result.
 ///
 /// # Errors
@@ -95,31 +137,38 @@ pub fn panel(set: &PanelSet, options: &Options) -> Result<Paneling, PanelingErro
         return Err(PanelingError::BadOption { name, value });
     }
     let scaled = set.scaled(1.0 / set.size);
-    let clusters = match options.clustering {
-        Clustering::Own => {
-            let features = clustering::features(&scaled, options.slope_weight);
-            clustering::shapes(&features, molds, 20)
-        }
-        Clustering::Grid(axis) => clustering::grid(set.curvatures(), molds, axis),
+    let features = match options.clustering {
+        Clustering::Grid(_) => Vec::new(),
+        Clustering::Own | Clustering::Cover => clustering::features(&scaled, options.slope_weight),
     };
-    Ok(fitted(set, &scaled, &clusters, options))
-}
-
-/// Fits given clusters; `scaled` is `set` in units of the panel size.
-fn fitted(set: &PanelSet, scaled: &PanelSet, clusters: &Clusters, options: &Options) -> Paneling {
+    let clusters = cluster(set, &features, options);
     let kinds = vec![options.mold_type; clusters.count];
-    let mut fit = Fit::new(scaled, clusters, &kinds, options.slope_weight);
-    let fit_history = fit.alternate(scaled, options.rounds);
+    let mut fit = Fit::new(&scaled, &clusters, &kinds, options.slope_weight);
+    let fit_history = fit.alternate(&scaled, options.rounds);
     let mut seam_history = Vec::new();
     if options.seam_steps > 0 {
-        let seam = SeamOptions {
-            steps: options.seam_steps,
-            gap_weight: 1.0,
-            design_weight: 0.1,
-            stall: 1e-2,
-        };
-        seam_history = seam_step::improve(scaled, &mut fit, &seam);
+        let weights = vec![1.0; scaled.seams.len()];
+        seam_history = seam_step::improve(&scaled, &mut fit, &options.seam_settings(), &weights);
     }
+    Ok(finish(set, fit, fit_history, seam_history))
+}
+
+/// Groups the panels as the options say.
+pub(crate) fn cluster(set: &PanelSet, features: &[Feature], options: &Options) -> Clusters {
+    match options.clustering {
+        Clustering::Own => clustering::shapes(features, options.molds, 20),
+        Clustering::Cover => clustering::cover(features, options.molds),
+        Clustering::Grid(axis) => clustering::grid(set.curvatures(), options.molds, axis),
+    }
+}
+
+/// Turns a fit in units of the panel size into model units and measures it.
+pub(crate) fn finish(
+    set: &PanelSet,
+    fit: Fit,
+    fit_history: Vec<f64>,
+    seam_history: Vec<f64>,
+) -> Paneling {
     let molds: Vec<Mold> = fit.molds.iter().map(|m| m.scaled(set.size)).collect();
     let poses: Vec<Pose> = fit
         .poses

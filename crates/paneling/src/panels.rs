@@ -228,6 +228,12 @@ impl PanelSet {
         self.diagonal
     }
 
+    /// A length in percent of the diagonal of the bounding box.
+    #[must_use]
+    pub fn percent_of_diagonal(&self, length: f64) -> f64 {
+        100.0 * length / self.diagonal
+    }
+
     /// The middle of each panel in the domain of the surface.
     #[must_use]
     pub fn middles(&self) -> &[[f64; 2]] {

@@ -88,20 +88,28 @@ impl Unknowns {
 }
 
 /// Lowers kinks and gaps of a fit; returns the energy before and after every accepted step.
-pub(crate) fn improve(set: &PanelSet, fit: &mut Fit, options: &SeamOptions) -> Vec<f64> {
+///
+/// `weights` has one factor per seam for its part of the energy.
+pub(crate) fn improve(
+    set: &PanelSet,
+    fit: &mut Fit,
+    options: &SeamOptions,
+    weights: &[f64],
+) -> Vec<f64> {
+    assert_eq!(weights.len(), set.seams.len(), "one weight per seam");
     let incident = incident_seams(set);
-    let mut energy = total_energy(set, fit, options);
+    let mut energy = total_energy(set, fit, options, weights);
     let mut history = vec![energy];
     let mut damping = 1e-4;
     let mut step = 0;
     while step < options.steps {
-        let system = System::linearize(set, fit, options, &incident);
+        let system = System::linearize(set, fit, options, weights, &incident);
         let mut accepted = false;
         // A refused step is tried again with more damping on the same linearisation.
         for _ in 0..4 {
             let change = system.solve(fit, damping);
             let trial = applied(fit, &change);
-            let next = total_energy(set, &trial, options);
+            let next = total_energy(set, &trial, options, weights);
             step += 1;
             if next < energy {
                 accepted = true;
@@ -136,12 +144,13 @@ fn incident_seams(set: &PanelSet) -> Vec<Vec<(usize, usize)>> {
     incident
 }
 
-fn total_energy(set: &PanelSet, fit: &Fit, options: &SeamOptions) -> f64 {
+fn total_energy(set: &PanelSet, fit: &Fit, options: &SeamOptions, weights: &[f64]) -> f64 {
     let seams: Vec<f64> = set
         .seams
         .par_iter()
+        .zip(weights)
         .with_min_len(64)
-        .map(|seam| {
+        .map(|(seam, weight)| {
             let (points, normals) = set.edge_samples(seam.edge);
             let mut sum = 0.0;
             for k in 0..SEAM_SAMPLES {
@@ -158,7 +167,7 @@ fn total_energy(set: &PanelSet, fit: &Fit, options: &SeamOptions) -> f64 {
                 let gap = options.gap_weight * (a.0 - b.0);
                 sum += gap * gap + tilt.length_squared() - along * along;
             }
-            sum
+            weight * sum
         })
         .collect();
     let design: Vec<f64> =
@@ -193,19 +202,22 @@ impl<'a> System<'a> {
         set: &'a PanelSet,
         fit: &Fit,
         options: &SeamOptions,
+        weights: &[f64],
         incident: &'a [Vec<(usize, usize)>],
     ) -> Self {
         let seams = set
             .seams
             .par_iter()
+            .zip(weights)
             .with_min_len(16)
-            .map(|seam| {
+            .map(|(seam, seam_weight)| {
+                let seam_weight = seam_weight.sqrt();
                 let (points, normals) = set.edge_samples(seam.edge);
                 let mut rows = SeamRows { residual: [0.0; ROWS], sides: [[[0.0; SIDE]; ROWS]; 2] };
                 for k in 0..SEAM_SAMPLES {
                     let (t1, t2) = normals[k].any_orthonormal_pair();
                     for (side, &p) in seam.panels.iter().enumerate() {
-                        let sign = if side == 0 { 1.0 } else { -1.0 };
+                        let sign = if side == 0 { seam_weight } else { -seam_weight };
                         let mold = &fit.molds[fit.labels[p]];
                         let here = seam_side(mold, &fit.poses[p], points[k], normals[k], [t1, t2]);
                         let values = [here.offset, here.tilt[0], here.tilt[1]];
