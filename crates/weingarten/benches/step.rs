@@ -1,0 +1,85 @@
+//! One accepted step at sizes of Table 2 of Pellis et al. 2021, and the whole roof over four levels.
+//!
+//! Run with one thread (`RAYON_NUM_THREADS=1`) to compare with the numbers in
+//! `docs/benchmarks/weingarten.md`.
+
+use std::hint::black_box;
+use std::time::Duration;
+
+use bspline::BsplineSurface;
+use criterion::{Criterion, criterion_group, criterion_main};
+use fixtures::surfaces::Shape;
+use weingarten::{Formulation, WeingartenOptions, optimize};
+
+/// Row, control points, samples.
+const ROWS: [(&str, [usize; 2], (usize, usize)); 5] = [
+    ("row 1", [14, 14], (28, 28)),
+    ("row 2", [18, 18], (36, 36)),
+    ("row 3", [25, 25], (50, 50)),
+    ("row 8c", [16, 20], (48, 60)),
+    ("row 10c, open", [40, 15], (80, 30)),
+];
+
+fn roof([n_u, n_v]: [usize; 2]) -> BsplineSurface {
+    Shape::Roof.surface(n_u, n_v, 4, 4)
+}
+
+/// Time of `iters` accepted steps as the solver reports it, planning excluded.
+fn steps(
+    surface: &BsplineSurface,
+    samples: (usize, usize),
+    formulation: Formulation,
+    iters: u64,
+) -> Duration {
+    let options = WeingartenOptions {
+        // From some steps away from the start, where no trial is refused.
+        iterations: 1,
+        samples: Some(samples),
+        formulation,
+        ..Default::default()
+    };
+    (0..iters)
+        .map(|_| {
+            let result = optimize(black_box(surface), &options).expect("a surface to optimise");
+            let solver = &result.report.levels[0].solver;
+            // Refused trials cost a factorisation each; a step with one is what is asked for.
+            solver.timings.total.mul_f64(1.0 / solver.factorizations.max(1) as f64)
+        })
+        .sum()
+}
+
+fn step(criterion: &mut Criterion) {
+    let mut group = criterion.benchmark_group("reduced step");
+    group.sample_size(20);
+    for (row, net, samples) in ROWS {
+        let start =
+            WeingartenOptions { iterations: 3, samples: Some(samples), ..Default::default() };
+        let surface = optimize(&roof(net), &start).expect("a surface to optimise").surface;
+        group.bench_function(row, |b| {
+            b.iter_custom(|iters| steps(&surface, samples, Formulation::Reduced, iters));
+        });
+    }
+    group.finish();
+    let mut group = criterion.benchmark_group("lifted step");
+    group.sample_size(10);
+    let surface = roof([25, 25]);
+    group.bench_function("row 3", |b| {
+        b.iter_custom(|iters| steps(&surface, (50, 50), Formulation::Lifted, iters));
+    });
+    group.finish();
+}
+
+fn levels(criterion: &mut Criterion) {
+    let options = WeingartenOptions {
+        levels: vec![(10, 8), (14, 10), (18, 14), (25, 18)],
+        ..Default::default()
+    };
+    let surface = roof([14, 14]);
+    let mut group = criterion.benchmark_group("roof over four levels");
+    group.sample_size(10);
+    group.bench_function("40 steps", |b| b.iter(|| optimize(black_box(&surface), &options)));
+    group.finish();
+}
+
+criterion_group!(benches, step, levels);
+criterion_main!(benches);
