@@ -15,6 +15,7 @@ use crate::curve::BezierCurve;
 use crate::data::{AsymptoticNet, DATA_DEGREE};
 use crate::dense::{AffineSpace, Cholesky, Matrix, affine_space, dot};
 use crate::error::{AsymptoticError, AsymptoticWarning};
+use crate::inflection::InflectedCurve;
 use crate::torsion_energy::TorsionCurve;
 use crate::vertex::{VertexFrame, vertex_frames};
 
@@ -95,6 +96,8 @@ pub struct Boundary {
     pub freedoms: usize,
     /// Vacuous equations, odd valences.
     pub warnings: Vec<AsymptoticWarning>,
+    /// Parameters of the declared inflections of each curve.
+    pub inflections: Vec<Vec<f64>>,
     pub(crate) signs: Vec<[f64; 2]>,
     /// Unit normal per vertex.
     pub(crate) normals: Vec<DVec3>,
@@ -147,6 +150,8 @@ pub fn solve_boundary(
         .into_par_iter()
         .map(|i| condense(&net, &frames, i, options.degree, &gram))
         .collect();
+    // Lines have no torsion; inflected curves take theirs from the curves they meet.
+    let silent = |i: usize| net.curves[i].line || net.curves[i].inflections > 0;
 
     let mut bounds: Vec<[f64; 2]> = (0..net.positions.len())
         .map(|v| options.torsions.get(v).copied().unwrap_or_default().bounds())
@@ -155,10 +160,10 @@ pub fn solve_boundary(
     let signs = arm_signs(&net, &frames);
     pin_torsions(&net, &frames, &condensed, &mut bounds, &mut warnings)?;
     let mut torsions = solve_torsions(&net, &signs, &condensed, &bounds);
-    // Where only lines meet no curve carries the torsion, but their patches still have one.
+    // Where no curve carries the torsion, the twist of the corners estimates it.
     for (v, frame) in frames.iter().enumerate() {
         let Some(frame) = frame else { continue };
-        if frame.arms.iter().all(|(i, _)| net.curves[*i].line) && bounds[v][0] < bounds[v][1] {
+        if frame.arms.iter().all(|(i, _)| silent(*i)) && bounds[v][0] < bounds[v][1] {
             torsions[v] =
                 bilinear_torsion(&net, &signs, frame, v).clamp(bounds[v][0], bounds[v][1]);
         }
@@ -167,7 +172,7 @@ pub fn solve_boundary(
         let curves: Vec<TorsionCurve> = condensed
             .iter()
             .enumerate()
-            .filter(|(i, _)| !net.curves[*i].line)
+            .filter(|(i, _)| !silent(*i))
             .map(|(i, c)| TorsionCurve {
                 points: c.points.clone(),
                 ends: net.curves[i].ends,
@@ -178,19 +183,26 @@ pub fn solve_boundary(
     }
     let free = bounds.iter().zip(&frames).filter(|(b, f)| f.is_some() && b[0] < b[1]).count();
 
-    let curves: Vec<BezierCurve> = condensed
-        .iter()
+    let solved: Vec<Result<(BezierCurve, Vec<f64>), AsymptoticError>> = condensed
+        .par_iter()
         .enumerate()
         .map(|(i, c)| {
-            let ends = net.curves[i].ends;
-            let (s, e) = (signs[i][0] * torsions[ends[0]], signs[i][1] * torsions[ends[1]]);
-            BezierCurve::new(
-                (0..=options.degree)
-                    .map(|k| c.points[0][k] + c.points[1][k] * s + c.points[2][k] * e)
-                    .collect(),
-            )
+            let curve = &net.curves[i];
+            let [s, e] = [0, 1].map(|e| signs[i][e] * torsions[curve.ends[e]]);
+            if !curve.line && curve.inflections > 0 {
+                return inflected(&net, &frames, i, [s, e], options.degree);
+            }
+            let point = |k: usize| c.points[0][k] + c.points[1][k] * s + c.points[2][k] * e;
+            Ok((BezierCurve::new((0..=options.degree).map(point).collect()), Vec::new()))
         })
         .collect();
+    let mut curves = Vec::with_capacity(solved.len());
+    let mut inflections = Vec::with_capacity(solved.len());
+    for result in solved {
+        let (curve, parameters) = result?;
+        curves.push(curve);
+        inflections.push(parameters);
+    }
     let strain_energy = curves.iter().map(|c| c.derivative_energy(2)).sum();
     Ok(Boundary {
         curves,
@@ -198,9 +210,36 @@ pub fn solve_boundary(
         strain_energy,
         freedoms: free + condensed.iter().map(|c| c.freedoms).sum::<usize>(),
         warnings,
+        inflections,
         signs,
         normals: frames.iter().map(|f| f.as_ref().map_or(DVec3::Z, |f| f.normal)).collect(),
     })
+}
+
+/// Curve `i` with its declared inflections, between ends of known torsion.
+fn inflected(
+    net: &AsymptoticNet,
+    frames: &[Option<VertexFrame>],
+    i: usize,
+    torsions: [f64; 2],
+    degree: usize,
+) -> Result<(BezierCurve, Vec<f64>), AsymptoticError> {
+    let curve = &net.curves[i];
+    let problem = InflectedCurve {
+        ends: curve.ends.map(|v| net.positions[v]),
+        arms: curve.arms,
+        normals: curve.ends.map(|v| frames[v].as_ref().map_or(DVec3::Z, |f| f.normal)),
+        curvatures: curve.curvatures,
+        torsions,
+    };
+    match problem.solve(curve.inflections) {
+        Ok(found) => Ok((found.curve.elevated(degree), found.parameters)),
+        Err((defect, iterations)) => Err(AsymptoticError::InflectionNotFound {
+            place: net.curve_place(i),
+            defect,
+            iterations,
+        }),
+    }
 }
 
 /// Torsion sign of each end of each curve.
@@ -264,7 +303,7 @@ fn condense(
     let size = (end_points[1] - end_points[0]).length().max(arms[0].length());
     let (mut rows, mut rhs, mut pinned) = (Vec::new(), Vec::new(), [None; 2]);
     let mut lever = [0.0; 2];
-    if !curve.line {
+    if !curve.line && curve.inflections == 0 {
         for e in 0..2 {
             let third = if e == 0 { 3 } else { degree - 3 };
             lever[e] =
@@ -377,8 +416,9 @@ fn pin_torsions(
                 if !(defect <= 1e-10 * size) {
                     return Err(AsymptoticError::TorsionInfeasible { place, defect });
                 }
-                if forced.is_some() {
-                    warnings.push(AsymptoticWarning::VacuousTorsion { place });
+                let warning = AsymptoticWarning::VacuousTorsion { place };
+                if forced.is_some() && !warnings.contains(&warning) {
+                    warnings.push(warning);
                 }
             }
             if !(bounds[v][0] <= tau && tau <= bounds[v][1]) && other.is_none() {
@@ -423,6 +463,9 @@ fn solve_torsions(
     let (mut diagonal, mut gradient) = (vec![0.0; n], vec![0.0; n]);
     let mut couplings = Vec::with_capacity(condensed.len());
     for (i, c) in condensed.iter().enumerate() {
+        if net.curves[i].inflections > 0 {
+            continue;
+        }
         let ends = net.curves[i].ends;
         for e in 0..2 {
             diagonal[ends[e]] += c.energy[1 + e][1 + e];

@@ -6,6 +6,7 @@ use crate::error::{AsymptoticError, Place};
 use crate::gridshell::{Gridshell, GridshellCheck, GridshellOptions, fill_net};
 use crate::patch::{PatchOptions, fill_patch};
 use crate::quad::{Quadrilateral, solve_quadrilateral};
+use crate::quartic::solve_quartic_quadrilateral;
 use crate::relax::{RelaxOptions, Relaxed, relax};
 
 /// What is to be bounded by asymptotic curves.
@@ -20,7 +21,7 @@ pub enum Input {
 /// Settings of a design.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct DesignOptions {
-    /// How the curves are solved.
+    /// How the curves are solved; degree 4 takes the quartics of a single patch.
     pub boundary: BoundaryOptions,
     /// How the faces are filled.
     pub patch: PatchOptions,
@@ -72,6 +73,9 @@ fn design_patch(data: &CornerData, options: &DesignOptions) -> Result<Design, As
             let relaxed = relax(data, relax_options)?;
             (relaxed.data.clone(), relaxed.quad.clone(), Some(relaxed))
         }
+        None if options.boundary.degree == 4 => {
+            (data.clone(), solve_quartic_quadrilateral(data)?, None)
+        }
         None => (data.clone(), solve_quadrilateral(data, &options.boundary)?, None),
     };
     let net = data.to_net(&quad.curvatures);
@@ -104,6 +108,7 @@ fn shell_of_one(
         strain_energy: quad.strain_energy,
         freedoms: quad.freedoms,
         warnings: Vec::new(),
+        inflections: quad.boundary.inflections.to_vec(),
         signs: vec![[1.0; 2], [-1.0; 2], [1.0; 2], [-1.0; 2]],
         normals: normals.collect(),
     };

@@ -84,7 +84,7 @@ pub enum AsymptoticError {
     UndeclaredInflection { place: Place, t: f64 },
     /// The declared inflection could not be built.
     #[error(
-        "{place}: no curve with the declared inflections found (defect {defect:.3e} after {iterations} iterations); change the end data or drop the declaration"
+        "{place}: no curve with the declared inflections found (defect {defect:.3e} in {iterations} starts); change the end data or drop the declaration"
     )]
     InflectionNotFound { place: Place, defect: f64, iterations: usize },
     /// Torsion equation without unknowns and with a defect.

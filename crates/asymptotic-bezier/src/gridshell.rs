@@ -76,16 +76,16 @@ pub fn fill_net(
     options: &GridshellOptions,
 ) -> Result<Gridshell, AsymptoticError> {
     let boundary = solve_boundary(net, &options.boundary)?;
-    fill_solved(net, boundary, vec![Vec::new(); net.curves().len()], &options.patch)
+    fill_solved(net, boundary, &options.patch)
 }
 
-/// Fills a net whose curves are solved already; `inflections` per curve of the net.
-pub(crate) fn fill_solved(
+/// Fills a net whose curves are solved already.
+fn fill_solved(
     net: &AsymptoticNet,
     boundary: Boundary,
-    inflections: Vec<Vec<f64>>,
     options: &PatchOptions,
 ) -> Result<Gridshell, AsymptoticError> {
+    let inflections = &boundary.inflections;
     let mut warnings = boundary.warnings.clone();
     let qualities: Vec<CurveQuality> =
         boundary.curves.par_iter().map(crate::curve::BezierCurve::quality).collect();

@@ -1,4 +1,30 @@
 //! Bezier patches bounded by asymptotic curves, and gridshells filled with them.
+//!
+//! Along an asymptotic curve the normal curvature is zero, so a strip orthogonal to the surface
+//! unrolls to a straight one. [`solve_quadrilateral`] makes four quintics from positions, tangents
+//! and curvatures at the corners (Wang et al. 2019), [`fill_patch`] the Bezier patch of least
+//! thin-plate energy that has them as asymptotic boundary, [`fill_net`] does both for whole nets,
+//! whose patches join with a common tangent plane, [`relax`] mends noisy data, and [`lamellas`]
+//! gives the strips. [`design()`] runs all of it and measures the result.
+//!
+//! Departures from the paper, and why: the boundary is solved for the corner torsions, which are
+//! its four free parameters (`K = −τ²`); the tangent fields are all polynomial ones instead of a
+//! two-term ansatz, which gives with degree seven what the paper needs eleven for; curves with
+//! inflections and lines have regular patches too.
+//!
+//! # Example
+//! ```
+//! use asymptotic_bezier::{DataFile, DesignOptions, design};
+//! # let text = std::fs::read_to_string("../../fixtures/asymptotic/catenoid.ron").unwrap();
+//! # let options = ron::Options::default()
+//! #     .with_default_extension(ron::extensions::Extensions::IMPLICIT_SOME);
+//! let file: DataFile = options.from_str(&text)?; // fixtures/asymptotic/catenoid.ron
+//! let (input, _) = file.input()?;
+//! let result = design(&input, &DesignOptions::default())?;
+//! assert!(result.metrics().normal_curvature_max < 1e-10);
+//! assert!(result.check.warnings.is_empty());
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
 
 mod bernstein;
 mod boundary;
@@ -12,10 +38,14 @@ mod field;
 mod file;
 mod fill;
 mod gridshell;
+mod inflection;
 mod intersect;
+mod lamella;
+mod mask;
 mod net;
 mod patch;
 mod quad;
+mod quartic;
 mod relax;
 mod surface;
 mod torsion_energy;
@@ -33,8 +63,11 @@ pub use error::{AsymptoticError, AsymptoticWarning, Place};
 pub use file::{DataFile, FileCurve, TorsionWish};
 pub use fill::MAX_SURFACE_DEGREE;
 pub use gridshell::{Gridshell, GridshellCheck, GridshellOptions, JoinCheck, fill_net};
+pub use lamella::{Lamella, LamellaNode, LamellaOptions, StripLayout, lamellas, strip_layout};
+pub use mask::Interior;
 pub use patch::{Ansatz, FilledPatch, PatchBoundary, PatchOptions, fill_patch};
 pub use quad::{Quadrilateral, solve_quadrilateral};
+pub use quartic::solve_quartic_quadrilateral;
 pub use relax::{RelaxOptions, Relaxed, relax};
 pub use surface::{Patch, PatchJet};
 pub use verify::PatchCheck;

@@ -10,6 +10,7 @@ use crate::dense::{Matrix, affine_space, axpy, dot, minimize_quadratic};
 use crate::error::{AsymptoticError, AsymptoticWarning, Place};
 use crate::field::{FieldSpace, line_fields, paper_ansatz, ribbon_fields, tangent_module};
 use crate::fill::{MAX_SURFACE_DEGREE, fill_table};
+use crate::mask::{Interior, masked};
 use crate::surface::Patch;
 
 /// Rank tolerance of the corner equations after scaling of the columns.
@@ -42,11 +43,19 @@ pub struct PatchOptions {
     pub bound: Option<f64>,
     /// Least sine between parameter lines before the next degree is tried.
     pub min_sine: f64,
+    /// How the inner control points are found once the tangent fields are.
+    pub interior: Interior,
 }
 
 impl Default for PatchOptions {
     fn default() -> Self {
-        Self { degree: None, ansatz: Ansatz::Module, bound: Some(0.25), min_sine: 0.1 }
+        Self {
+            degree: None,
+            ansatz: Ansatz::Module,
+            bound: Some(0.25),
+            min_sine: 0.1,
+            interior: Interior::ThinPlate,
+        }
     }
 }
 
@@ -196,7 +205,8 @@ fn fill_degree(
             });
         }
     }
-    let (patch, thin_plate_energy) = family.patch(&y);
+    let thin_plate = family.patch(&y);
+    let (patch, thin_plate_energy) = masked(&thin_plate.0, options.interior).unwrap_or(thin_plate);
     Ok(FilledPatch {
         patch,
         thin_plate_energy,

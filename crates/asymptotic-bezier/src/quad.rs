@@ -183,15 +183,8 @@ pub(crate) fn solve_signed(
     let solved = solve_boundary(&net, options)?;
     let curves: [BezierCurve; 4] = std::array::from_fn(|i| solved.curves[i].clone());
     let torsions: [f64; 4] = std::array::from_fn(|c| solved.torsions[c]);
-    finish(
-        data,
-        *signed,
-        curves,
-        torsions,
-        [const { Vec::new() }; 4],
-        solved.freedoms,
-        solved.warnings,
-    )
+    let inflections = std::array::from_fn(|i| solved.inflections[i].clone());
+    finish(data, *signed, curves, torsions, inflections, solved.freedoms, solved.warnings)
 }
 
 /// Qualities, hard faults of the curves and warnings.

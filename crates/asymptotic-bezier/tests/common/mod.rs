@@ -196,3 +196,48 @@ pub(crate) fn noisy(data: &CornerData, sigma: f64, seed: u64) -> CornerData {
     out.curvatures = Curvatures::Signed(k);
     out
 }
+
+/// Corner data of a window of a surface in asymptotic parameters, exact to rounding.
+pub(crate) fn corner_data(
+    surface: impl Fn(f64, f64) -> DVec3 + Copy,
+    [p0, p1, q0, q1]: [f64; 4],
+) -> CornerData {
+    let at = |s: f64, t: f64| surface(p0 + (p1 - p0) * s, q0 + (q1 - q0) * t);
+    // Parameters of both ends of r1..r4 and which parameter runs.
+    let ends = [
+        ([(0., 0.), (1., 0.)], true),
+        ([(0., 0.), (0., 1.)], false),
+        ([(0., 1.), (1., 1.)], true),
+        ([(1., 0.), (1., 1.)], false),
+    ];
+    let mut data = CornerData {
+        corners: [at(0., 0.), at(1., 0.), at(0., 1.), at(1., 1.)],
+        start_points: [DVec3::ZERO; 4],
+        end_points: [DVec3::ZERO; 4],
+        curvatures: Curvatures::Signed([[0.0; 2]; 4]),
+        lines: [false; 4],
+        inflections: [0; 4],
+    };
+    let mut k = [[0.0; 2]; 4];
+    for (i, (pair, along_u)) in ends.into_iter().enumerate() {
+        for (e, (s, t)) in pair.into_iter().enumerate() {
+            let along_s = || derivatives(|x| at(x, t), s);
+            let along_t = || derivatives(|x| at(s, x), t);
+            let ((first, second), (other, _)) =
+                if along_u { (along_s(), along_t()) } else { (along_t(), along_s()) };
+            let arm = first * if e == 0 { 0.2 } else { -0.2 };
+            if e == 0 {
+                data.start_points[i] = at(s, t) + arm;
+            } else {
+                data.end_points[i] = at(s, t) + arm;
+            }
+            // Into the patch: along the other parameter at its start, against it at its end.
+            let inward = other * if (if along_u { t } else { s }) == 0.0 { 1.0 } else { -1.0 };
+            let across = second - first * (second.dot(first) / first.length_squared());
+            let size = first.cross(second).length() / first.length().powi(3);
+            k[i][e] = size * across.dot(inward).signum();
+        }
+    }
+    data.curvatures = Curvatures::Signed(k);
+    data
+}
