@@ -24,8 +24,8 @@ use crate::failure::Failure;
 use crate::outcome::{Outcome, Status};
 use crate::report_support::jets::spline_view;
 use crate::report_support::mesh::mesh_view;
-use exchange::Model;
-use report::Report;
+use exchange::{Mesh, Model};
+use report::{LineRole, LineSet, Report};
 use serde_json::Value;
 
 impl ReportArgs {
@@ -42,10 +42,13 @@ pub(crate) fn new(title: &str) -> Report {
     Report::new(title, line)
 }
 
-/// Adds a stage for the surfaces of `model` and one for each of its meshes.
+/// Adds a stage for the surfaces of `model` and one for each of its meshes; its polylines are drawn
+/// over the last of them.
 pub(crate) fn add_model(report: &mut Report, model: &Model) -> Result<(), Failure> {
     report.length_unit = model.unit.to_string();
-    for mesh in model.meshes.iter().filter(|m| !m.faces.is_empty()) {
+    let (solid, loose): (Vec<&Mesh>, Vec<&Mesh>) =
+        model.meshes.iter().partition(|m| !m.faces.is_empty());
+    for mesh in solid {
         let name = if mesh.name.is_empty() { "mesh" } else { &mesh.name };
         report.stages.push(mesh_view(name, mesh, &report.length_unit)?);
     }
@@ -53,6 +56,12 @@ pub(crate) fn add_model(report: &mut Report, model: &Model) -> Result<(), Failur
         let surfaces: Vec<_> = model.surfaces.iter().map(|s| &s.surface).collect();
         let name = if surfaces.len() == 1 { "surface" } else { "surfaces" };
         report.stages.push(spline_view(name, &surfaces, None, &report.length_unit)?);
+    }
+    let lines = loose.iter().flat_map(|m| (0..m.lines.len()).map(|k| m.polyline(k).collect()));
+    let mut curves = LineSet::new("lines", "curves", LineRole::Curves, lines.collect());
+    curves.visible = true;
+    if let (false, Some(view)) = (curves.polylines.is_empty(), report.stages.pop()) {
+        report.stages.push(view.with_lines(curves).map_err(refused)?);
     }
     Ok(())
 }

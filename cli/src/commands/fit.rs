@@ -1,9 +1,10 @@
 //! `umbilic fit MESH|POINTS -o SURFACE`.
 
-use crate::args::{ConfigArgs, Counts, OutputArgs};
+use crate::args::{ConfigArgs, Counts, OutputArgs, ReportArgs};
 use crate::context::Context;
 use crate::failure::Failure;
 use crate::outcome::{Outcome, Status};
+use crate::report_support::{self, jets::spline_view};
 use bspline::{Degree, GridFit, GridFitOptions, fit_grid};
 use exchange::Model;
 use geom_core::{BoundingBox, DVec3, QuadGrid};
@@ -22,6 +23,8 @@ pub(crate) struct Fit {
     config: ConfigArgs,
     #[command(flatten)]
     options: Options,
+    #[command(flatten)]
+    report: ReportArgs,
 }
 
 /// Options of the method.
@@ -50,8 +53,9 @@ struct Points {
 }
 
 impl Fit {
-    pub(crate) fn run(self, _context: &Context) -> Result<Outcome, Failure> {
+    pub(crate) fn run(self, context: &Context) -> Result<Outcome, Failure> {
         self.output.check()?;
+        self.report.check()?;
         let options = self.options.over(self.config.load()?);
         let settings = settings(&options)?;
         let model =
@@ -79,12 +83,20 @@ impl Fit {
                 fit.distance_mean, fit.distance_rms, fit.distance_max, metrics.distance_max_percent
             ),
         ];
-        outcome.warnings = model.warnings;
+        outcome.warnings.clone_from(&model.warnings);
         if !within {
             let tolerance = fit.tolerance;
             outcome.warnings.push(format!(
                 "the distance exceeds the tolerance of {tolerance:.3e} {unit}; ask for more control points"
             ));
+        }
+        if self.report.wanted() {
+            let mut report = report_support::new("Fit of a surface");
+            report_support::add_model(&mut report, &model)?;
+            report.stages.push(spline_view("fitted", &[&fit.surface], None, &unit.to_string())?);
+            report.option("degree", fit.surface.degree_u());
+            report.option("tolerance", fit.tolerance);
+            report_support::add_files(&mut outcome, &self.report, context, report)?;
         }
         let name = self.input.file_stem().map(|s| s.to_string_lossy().into_owned());
         let fitted = Model::of_surface(&name.unwrap_or_default(), fit.surface, model.unit);
