@@ -16,6 +16,7 @@
 pub(crate) mod energies;
 pub(crate) mod jets;
 pub(crate) mod mesh;
+pub(crate) mod panels;
 pub(crate) mod weingarten;
 
 use crate::args::ReportArgs;
@@ -60,7 +61,9 @@ pub(crate) fn add_model(report: &mut Report, model: &Model) -> Result<(), Failur
     let lines = loose.iter().flat_map(|m| (0..m.lines.len()).map(|k| m.polyline(k).collect()));
     let mut curves = LineSet::new("lines", "curves", LineRole::Curves, lines.collect());
     curves.visible = true;
-    if let (false, Some(view)) = (curves.polylines.is_empty(), report.stages.pop()) {
+    if !curves.polylines.is_empty()
+        && let Some(view) = report.stages.pop()
+    {
         report.stages.push(view.with_lines(curves).map_err(refused)?);
     }
     Ok(())
@@ -111,7 +114,24 @@ fn refused(error: report::ReportError) -> Failure {
 
 #[cfg(test)]
 mod tests {
-    use super::quoted;
+    use super::*;
+
+    #[test]
+    fn surfaces_meshes_and_loose_curves_of_a_file_arrive() {
+        let corners = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]];
+        let positions = corners.map(|[x, y]| geom_core::DVec3::new(x, y, 0.0)).to_vec();
+        let face = Mesh::new(positions.clone(), [[0, 1, 2]]);
+        let mut loose = Mesh { positions, ..Mesh::default() };
+        loose.lines.push(&[0, 1, 2]);
+        let stages = |meshes: Vec<Mesh>| {
+            let mut report = Report::default();
+            add_model(&mut report, &Model { meshes, ..Model::default() }).unwrap();
+            report.stages.iter().map(|s| s.lines().len()).collect::<Vec<_>>()
+        };
+        assert_eq!(stages(vec![face.clone()]), [1]);
+        assert_eq!(stages(vec![face, loose.clone()]), [2]);
+        assert!(stages(vec![loose]).is_empty());
+    }
 
     #[test]
     fn words_are_quoted_where_a_shell_needs_it() {
