@@ -3,6 +3,7 @@
 
 mod bench;
 mod ci;
+mod judges;
 mod regress;
 mod scene;
 mod shell;
@@ -17,6 +18,7 @@ cargo xtask <chore>
   tidy                     dependency directions, cited papers, stray paths, file sizes
   regress [NAME…]          run the scenes under fixtures/regress (all, or those named)
   regress --bless NAME     rewrite the CloseTo values of one scene (never a bound)
+  judges                   let independent programs read what we write, where they are installed
   bench [PACKAGE…]         run the benches and record them in docs/benchmarks.md
   bench --proof            run the solver on the public test sets, write docs/solver-proof.md
 ";
@@ -29,6 +31,7 @@ fn main() -> ExitCode {
         ["tidy"] => tidy::run(),
         ["regress", "--bless", name] => regress::bless(name),
         ["regress", names @ ..] => regress::run(names).map(|_| ()),
+        ["judges"] => judges::run(),
         ["bench", "--proof"] => bench::proof(),
         ["bench", packages @ ..] => bench::run(packages),
         _ => {

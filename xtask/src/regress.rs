@@ -1,10 +1,9 @@
 //! `cargo xtask regress`: run the scenes and compare their metrics with what is expected.
 
 use crate::scene::{Expectation, NamedScene, all, look_up};
-use crate::shell::{Outcome, cargo, check, read, root, write};
+use crate::shell::{Outcome, build_umbilic, read, root, umbilic, write};
 use serde_json::Value;
 use std::path::{Path, PathBuf};
-use std::process::Command;
 use std::time::Instant;
 
 /// Runs the scenes named (all if none is) and returns those skipped, each with the reason.
@@ -13,7 +12,7 @@ pub(crate) fn run(names: &[&str]) -> Outcome<Vec<String>> {
     if let Some(unknown) = names.iter().find(|n| !scenes.iter().any(|s| s.name == **n)) {
         return Err(format!("there is no scene {unknown} under fixtures/regress"));
     }
-    build()?;
+    build_umbilic()?;
     let (mut skipped, mut missed) = (Vec::new(), 0);
     for scene in scenes.iter().filter(|s| names.is_empty() || names.contains(&s.name.as_str())) {
         if let Some(reason) = missing_folder(scene) {
@@ -39,7 +38,7 @@ pub(crate) fn bless(name: &str) -> Outcome {
     let scenes = all()?;
     let scene =
         scenes.iter().find(|s| s.name == name).ok_or(format!("there is no scene {name}"))?;
-    build()?;
+    build_umbilic()?;
     let metrics = measure(scene)?;
     let mut text = read(&scene.path)?;
     for (key, wanted) in &scene.scene.expect {
@@ -60,10 +59,6 @@ fn replace_close_to(text: &str, key: &str, value: f64, tolerance: f64) -> Option
     Some(format!("{}CloseTo({value:?}, {tolerance:?}){}", &text[..open], &text[close..]))
 }
 
-fn build() -> Outcome {
-    check(cargo(&["build", "--quiet", "--package", "cli"]))
-}
-
 fn folder_of(need: &str) -> Option<PathBuf> {
     let variable = format!("UMBILIC_{}", need.to_uppercase());
     std::env::var_os(variable).map(PathBuf::from).filter(|path| path.is_dir())
@@ -81,8 +76,7 @@ fn measure(scene: &NamedScene) -> Outcome<Value> {
     let _ = std::fs::remove_dir_all(&out);
     std::fs::create_dir_all(&out).map_err(|e| format!("{}: {e}", out.display()))?;
     let metrics = out.join("metrics.json");
-    let mut command = Command::new(program());
-    command.current_dir(root());
+    let mut command = umbilic();
     command.args(scene.scene.args.iter().map(|argument| fill_in(argument, &out)));
     command.arg("-q").arg("--metrics").arg(&metrics);
     let output = command.output().map_err(|e| format!("{}: {e}", scene.name))?;
@@ -91,12 +85,6 @@ fn measure(scene: &NamedScene) -> Outcome<Value> {
         return Err(format!("{}: umbilic ended with {}: {said}", scene.name, output.status));
     }
     serde_json::from_str(&read(&metrics)?).map_err(|e| format!("{}: {e}", metrics.display()))
-}
-
-fn program() -> PathBuf {
-    let target =
-        std::env::var_os("CARGO_TARGET_DIR").map_or_else(|| root().join("target"), PathBuf::from);
-    target.join("debug").join(format!("umbilic{}", std::env::consts::EXE_SUFFIX))
 }
 
 fn fill_in(argument: &str, out: &Path) -> String {

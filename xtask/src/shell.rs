@@ -18,6 +18,22 @@ pub(crate) fn cargo(arguments: &[&str]) -> Command {
     command
 }
 
+/// Builds the command line tool together with all tests: with the same features as the test step of
+/// `ci`, so that no dependency is compiled twice.
+pub(crate) fn build_umbilic() -> Outcome {
+    check(cargo(&["test", "--workspace", "--no-run", "--quiet"]))
+}
+
+/// The command line tool as the last `cargo build` left it, in the workspace root.
+pub(crate) fn umbilic() -> Command {
+    let target =
+        std::env::var_os("CARGO_TARGET_DIR").map_or_else(|| root().join("target"), PathBuf::from);
+    let mut command =
+        Command::new(target.join("debug").join(format!("umbilic{}", std::env::consts::EXE_SUFFIX)));
+    command.current_dir(root());
+    command
+}
+
 /// Runs `command` and fails unless it succeeds.
 pub(crate) fn check(mut command: Command) -> Outcome {
     let line = describe(&command);

@@ -1,0 +1,239 @@
+//! `cargo xtask judges`: written files read again by independent programs.
+//!
+//! Open CASCADE evaluates every face of a STEP file on a grid of parameters; points, Gaussian and
+//! mean curvature must agree with our own evaluation of the same file. The glTF validator must
+//! find no error in a GLB file. What is not installed is skipped by name.
+
+use crate::shell::{Outcome, build_umbilic, check, root, umbilic};
+use bspline::BsplineSurface;
+use serde::Deserialize;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+/// Largest difference of points (times the size of the surface) and of curvatures (times their
+/// largest size on the face) that counts as agreement.
+const AGREEMENT: f64 = 1e-8;
+/// Samples per direction of every face, both ends included.
+const SAMPLES: usize = 9;
+
+/// What the judge of Open CASCADE prints.
+#[derive(Deserialize)]
+struct Verdict {
+    roots: usize,
+    valid: bool,
+    faces: Vec<Face>,
+}
+
+#[derive(Deserialize)]
+struct Face {
+    domain: [f64; 4],
+    /// u, v, x, y, z, K, H; millimetres.
+    samples: Vec<[f64; 7]>,
+}
+
+/// A command that writes files to be judged; `{out}` is the scratch folder.
+struct Case {
+    name: &'static str,
+    arguments: &'static [&'static str],
+    step: Option<&'static str>,
+    glb: Option<&'static str>,
+    /// Whether all boundaries are asymptotic curves, so that K there must be minus the torsion
+    /// squared.
+    asymptotic: bool,
+}
+
+const CASES: &[Case] = &[
+    Case::surface("saddle", &["convert", "fixtures/saddle.ron", "{out}/a.step"]),
+    Case::surface("tube, closed", &["convert", "fixtures/tube.ron", "{out}/a.step"]),
+    Case::surface("sphere cap, rational", &["convert", "fixtures/sphere-cap.ron", "{out}/a.step"]),
+    Case::surface(
+        "torus patch, rational",
+        &["convert", "fixtures/torus-patch.ron", "{out}/a.step"],
+    ),
+    Case {
+        name: "catenoid window, asymptotic boundary",
+        arguments: &["asymptotic", "fixtures/asymptotic/catenoid.ron", "-o", "{out}/a.step"],
+        step: Some("a.step"),
+        glb: None,
+        asymptotic: true,
+    },
+    Case {
+        name: "Enneper window, asymptotic boundary",
+        arguments: &[
+            "asymptotic",
+            "fixtures/asymptotic/enneper.ron",
+            "-o",
+            "{out}/a.step",
+            "-o",
+            "{out}/a.glb",
+        ],
+        step: Some("a.step"),
+        glb: Some("a.glb"),
+        asymptotic: true,
+    },
+    Case {
+        name: "saddle as GLB",
+        arguments: &["convert", "fixtures/saddle.ron", "{out}/a.glb"],
+        step: None,
+        glb: Some("a.glb"),
+        asymptotic: false,
+    },
+];
+
+impl Case {
+    const fn surface(name: &'static str, arguments: &'static [&'static str]) -> Self {
+        Self { name, arguments, step: Some("a.step"), glb: None, asymptotic: false }
+    }
+}
+
+/// Judges all cases; fails on the first disagreement.
+pub(crate) fn run() -> Outcome {
+    build_umbilic()?;
+    let python = python_with_open_cascade();
+    let node = node_with_validator();
+    for (missing, name, wanted) in [
+        (python.is_none(), "Open CASCADE", "a python3 (or UMBILIC_JUDGE_PYTHON) with OCP 7.9.3.1"),
+        (node.is_none(), "the glTF validator", "node with gltf-validator on NODE_PATH"),
+    ] {
+        if missing {
+            println!("SKIPPED {name}: needs {wanted}");
+        }
+    }
+    for (k, case) in CASES.iter().enumerate() {
+        let out = root().join("target/judges").join(k.to_string());
+        std::fs::create_dir_all(&out).map_err(|e| format!("{}: {e}", out.display()))?;
+        write_files(case, &out)?;
+        if let (Some(python), Some(file)) = (&python, case.step) {
+            let said = judge_step(python, &out.join(file), case.asymptotic)
+                .map_err(|e| format!("{}: {e}", case.name))?;
+            println!("{}: Open CASCADE agrees: {said}", case.name);
+        }
+        if let (Some(node), Some(file)) = (&node, case.glb) {
+            let mut validator = Command::new(node);
+            validator.arg(root().join("xtask/judges/gltf.cjs")).arg(out.join(file));
+            check(validator).map_err(|e| format!("{}: {e}", case.name))?;
+        }
+    }
+    Ok(())
+}
+
+fn write_files(case: &Case, out: &Path) -> Outcome {
+    let mut command = umbilic();
+    let shown = out.to_string_lossy();
+    command.args(case.arguments.iter().map(|a| a.replace("{out}", &shown))).arg("-q");
+    check(command).map_err(|e| format!("{}: {e}", case.name))
+}
+
+fn python_with_open_cascade() -> Option<PathBuf> {
+    let chosen = std::env::var_os("UMBILIC_JUDGE_PYTHON").map(PathBuf::from);
+    let python = chosen.unwrap_or_else(|| "python3".into());
+    let tried = Command::new(&python).args(["-c", "import OCP"]).output();
+    tried.is_ok_and(|output| output.status.success()).then_some(python)
+}
+
+fn node_with_validator() -> Option<PathBuf> {
+    let tried = Command::new("node").args(["-e", "require('gltf-validator')"]).output();
+    tried.is_ok_and(|output| output.status.success()).then(|| "node".into())
+}
+
+/// Compares every sample of every face; returns the largest differences in words.
+fn judge_step(python: &Path, file: &Path, asymptotic: bool) -> Outcome<String> {
+    let mut judge = Command::new(python);
+    judge.arg(root().join("xtask/judges/open_cascade.py")).arg(file).arg(SAMPLES.to_string());
+    let output = judge.output().map_err(|e| format!("the judge could not start: {e}"))?;
+    if !output.status.success() {
+        return Err(String::from_utf8_lossy(&output.stderr).into_owned());
+    }
+    // The reader itself may print a report before the JSON.
+    let text = String::from_utf8_lossy(&output.stdout);
+    let json = text.find("{\"roots\"").map_or("", |at| &text[at..]);
+    let verdict: Verdict =
+        serde_json::from_str(json).map_err(|e| format!("the judge said: {e}"))?;
+    let model = exchange::read_model(file).map_err(|e| e.to_string())?;
+    if !verdict.valid || verdict.roots == 0 {
+        return Err("Open CASCADE finds the shape invalid".to_owned());
+    }
+    if verdict.faces.len() != model.surfaces.len() {
+        let (theirs, ours) = (verdict.faces.len(), model.surfaces.len());
+        return Err(format!("Open CASCADE finds {theirs} faces, we wrote {ours}"));
+    }
+    let scale = model.unit.metres() * 1e3;
+    let mut worst = Differences::default();
+    for (face, named) in verdict.faces.iter().zip(&model.surfaces) {
+        worst.merge(&compare(face, &named.surface, scale, asymptotic)?);
+    }
+    worst.check(verdict.faces.len())
+}
+
+/// Largest differences, each relative to the largest value on its face.
+#[derive(Default)]
+struct Differences {
+    point: f64,
+    gaussian: f64,
+    mean: f64,
+    torsion: f64,
+}
+
+impl Differences {
+    fn merge(&mut self, other: &Self) {
+        self.point = self.point.max(other.point);
+        self.gaussian = self.gaussian.max(other.gaussian);
+        self.mean = self.mean.max(other.mean);
+        self.torsion = self.torsion.max(other.torsion);
+    }
+
+    fn check(&self, faces: usize) -> Outcome<String> {
+        let said = format!(
+            "{faces} faces, points to {:.1e}, K to {:.1e}, H to {:.1e}, K + torsion² to {:.1e}",
+            self.point, self.gaussian, self.mean, self.torsion
+        );
+        let worst = [self.point, self.gaussian, self.mean, self.torsion];
+        // Written so that NaN is a disagreement.
+        if worst.iter().all(|&d| d <= AGREEMENT) { Ok(said) } else { Err(said) }
+    }
+}
+
+fn compare(
+    face: &Face,
+    surface: &BsplineSurface,
+    scale: f64,
+    asymptotic: bool,
+) -> Outcome<Differences> {
+    let mut found = Differences::default();
+    let size = face.samples.iter().flat_map(|s| &s[2..5]).fold(0.0_f64, |m, x| m.max(x.abs()));
+    let largest = |k: usize| face.samples.iter().fold(0.0_f64, |m, s| m.max(s[k].abs()));
+    let (gaussian_size, mean_size) = (largest(5), largest(6));
+    let relative =
+        |difference: f64, size: f64| difference.abs() / if size > 0.0 { size } else { 1.0 };
+    for &[u, v, x, y, z, gaussian, mean] in &face.samples {
+        let jet = surface.jet(u, v, 3);
+        let theirs = geom_core::DVec3::new(x, y, z);
+        found.point = found.point.max(relative((jet.position() * scale).distance(theirs), size));
+        let our_gaussian = jet.gaussian_curvature().map_err(|e| e.to_string())? / (scale * scale);
+        let our_mean = jet.mean_curvature().map_err(|e| e.to_string())? / scale;
+        found.gaussian = found.gaussian.max(relative(our_gaussian - gaussian, gaussian_size));
+        // The sign of H depends on the side a face is looked at from.
+        found.mean = found.mean.max(relative(our_mean.abs() - mean.abs(), mean_size));
+        if asymptotic {
+            let [u0, u1, v0, v1] = face.domain;
+            if let Some(torsion) = boundary_torsion(&jet, [u == u0 || u == u1, v == v0 || v == v1])
+            {
+                let want = -(torsion / scale).powi(2);
+                found.torsion = found.torsion.max(relative(gaussian - want, gaussian_size));
+            }
+        }
+    }
+    Ok(found)
+}
+
+/// Torsion of the parameter line through a boundary point that runs along the boundary.
+fn boundary_torsion(jet: &geom_core::SurfaceJet, [on_u, on_v]: [bool; 2]) -> Option<f64> {
+    let derivatives = match (on_u, on_v) {
+        (true, _) => [jet.d(0, 1), jet.d(0, 2), jet.d(0, 3)],
+        (_, true) => [jet.d(1, 0), jet.d(2, 0), jet.d(3, 0)],
+        _ => return None,
+    };
+    let [first, second, third] = derivatives;
+    let binormal = first.cross(second);
+    (binormal.length_squared() > 0.0).then(|| binormal.dot(third) / binormal.length_squared())
+}
