@@ -1,0 +1,439 @@
+//! Integrals over a whole subdivision surface and their gradients.
+
+use crate::density::Density;
+use crate::functional::{Coefficients, Energy, Functional};
+use crate::kernel::{GRADIENT_LEN, PatchRun, Task};
+use crate::rules::{Quadrature, SeparableRule, Table};
+use pulp::Arch;
+use rayon::prelude::*;
+use subdiv_catmull_clark::{BasisId, SubdivisionSurface};
+
+/// Patches a worker takes at a time, so that sums do not depend on how the work was divided.
+const RUN: usize = 8;
+
+pub(crate) enum Rule {
+    Separable(SeparableRule),
+    Table(Table),
+}
+
+/// Patches with one basis and one multiplicity.
+pub(crate) struct Group {
+    pub(crate) rule: Rule,
+    pub(crate) basis: BasisId,
+    /// Control points per patch.
+    pub(crate) per_patch: usize,
+    /// Control points, patch after patch.
+    pub(crate) controls: Vec<u32>,
+    /// How many copies of every patch the surface has.
+    pub(crate) multiplicity: f64,
+    /// First control point slot among those of all groups.
+    first_slot: usize,
+    first_patch: usize,
+}
+
+impl Group {
+    pub(crate) fn patches(&self) -> usize {
+        self.controls.len() / self.per_patch
+    }
+}
+
+/// Evaluates energies of a subdivision surface, given its control points as a flat list of
+/// coordinates.
+///
+/// Every patch writes its own gradient; the vertices then collect them in a fixed order, so the
+/// result is the same to the last bit for any number of threads.
+pub struct SurfaceEnergy {
+    arch: Arch,
+    groups: Vec<Group>,
+    vertex_count: usize,
+    patch_count: usize,
+    slot_count: usize,
+    // For every vertex its slots, compressed: `slots[starts[v]..starts[v + 1]]`.
+    starts: Vec<u32>,
+    slots: Vec<u32>,
+    // Factor of a slot's gradient: the multiplicity of its patch.
+    slot_factors: Vec<f64>,
+}
+
+/// Buffers of [`SurfaceEnergy`], kept between evaluations.
+#[derive(Default)]
+pub struct Workspace {
+    integrals: Vec<[f64; 2]>,
+    gradients: Vec<f64>,
+}
+
+/// Values of all functionals on one surface.
+#[derive(Clone, Debug, PartialEq)]
+pub struct EnergyTable {
+    values: Vec<(Functional, f64)>,
+}
+
+impl EnergyTable {
+    /// The value of a functional; for a weighted Mehlum-Tarrou energy from its two parts.
+    #[must_use]
+    pub fn get(&self, functional: Functional) -> f64 {
+        if let Functional::MehlumTarrou { w1, w3 } = functional {
+            return w1 * self.get(Functional::F1) + w3 * self.get(Functional::F3);
+        }
+        self.values.iter().find(|(f, _)| *f == functional).map_or(f64::NAN, |(_, value)| *value)
+    }
+
+    /// The value of a weighted sum.
+    #[must_use]
+    pub fn total(&self, energy: &Energy) -> f64 {
+        energy.combine(|functional| self.get(functional))
+    }
+
+    /// All functionals in the order of [`Functional::ALL`].
+    pub fn iter(&self) -> impl Iterator<Item = (Functional, f64)> + '_ {
+        self.values.iter().copied()
+    }
+}
+
+impl SurfaceEnergy {
+    /// Evaluates all patches of a surface.
+    #[must_use]
+    pub fn new(surface: &SubdivisionSurface, vertex_count: usize, quadrature: Quadrature) -> Self {
+        Self::with_multiplicities(surface, vertex_count, quadrature, &[])
+    }
+
+    /// Evaluates only patches whose multiplicity is not zero, and counts each that many times;
+    /// with an empty list every patch counts once.
+    pub(crate) fn with_multiplicities(
+        surface: &SubdivisionSurface,
+        vertex_count: usize,
+        quadrature: Quadrature,
+        multiplicities: &[u32],
+    ) -> Self {
+        let mut keys: Vec<(BasisId, u32)> = Vec::new();
+        let key = |i: usize| -> (BasisId, u32) {
+            let patch = &surface.patches()[i];
+            (patch.basis, multiplicities.get(i).copied().unwrap_or(1))
+        };
+        for i in 0..surface.patches().len() {
+            if key(i).1 > 0 && !keys.contains(&key(i)) {
+                keys.push(key(i));
+            }
+        }
+        // The costly patches first, so that no worker is left with them at the end.
+        keys.sort_by_key(|&(basis, multiplicity)| {
+            (surface.regular_basis() == Some(basis), basis, multiplicity)
+        });
+        let mut tables: Vec<(BasisId, Table)> = keys
+            .iter()
+            .map(|k| k.0)
+            .filter(|&b| surface.regular_basis() != Some(b))
+            .collect::<std::collections::BTreeSet<_>>()
+            .into_par_iter()
+            .map(|b| {
+                let nodes = if surface.is_blended(b) || surface.b_spline_grid(b).is_none() {
+                    quadrature.extraordinary
+                } else {
+                    quadrature.regular
+                };
+                (b, Table::new(surface, b, nodes))
+            })
+            .collect();
+        tables.sort_by_key(|t| t.0);
+        let mut this = Self {
+            arch: Arch::new(),
+            groups: Vec::with_capacity(keys.len()),
+            vertex_count,
+            patch_count: 0,
+            slot_count: 0,
+            starts: Vec::new(),
+            slots: Vec::new(),
+            slot_factors: Vec::new(),
+        };
+        for &wanted in &keys {
+            let (basis, multiplicity) = wanted;
+            let rule = if surface.regular_basis() == Some(basis) {
+                match SeparableRule::new(surface, basis, quadrature.regular) {
+                    Some(rule) => Rule::Separable(rule),
+                    None => Rule::Table(Table::new(surface, basis, quadrature.regular)),
+                }
+            } else {
+                let at = tables.partition_point(|t| t.0 < basis);
+                Rule::Table(tables[at].1.clone())
+            };
+            let mut controls = Vec::new();
+            for (i, patch) in surface.patches().iter().enumerate() {
+                if key(i) == wanted {
+                    controls.extend_from_slice(&patch.controls);
+                }
+            }
+            let per_patch = match &rule {
+                Rule::Separable(_) => 16,
+                Rule::Table(table) => table.controls,
+            };
+            let patches = controls.len() / per_patch;
+            let (first_slot, first_patch) = (this.slot_count, this.patch_count);
+            this.slot_count += controls.len();
+            this.patch_count += patches;
+            this.groups.push(Group {
+                rule,
+                basis,
+                per_patch,
+                controls,
+                multiplicity: f64::from(multiplicity),
+                first_slot,
+                first_patch,
+            });
+        }
+        this.list_slots();
+        this
+    }
+
+    fn list_slots(&mut self) {
+        let mut starts = vec![0_u32; self.vertex_count + 1];
+        for group in &self.groups {
+            for &v in &group.controls {
+                starts[v as usize + 1] += 1;
+            }
+        }
+        for v in 0..self.vertex_count {
+            starts[v + 1] += starts[v];
+        }
+        let mut next = starts.clone();
+        self.slots = vec![0; self.slot_count];
+        self.slot_factors = vec![0.0; self.slot_count];
+        for group in &self.groups {
+            for (k, &v) in group.controls.iter().enumerate() {
+                let slot = group.first_slot + k;
+                self.slots[next[v as usize] as usize] = slot as u32;
+                self.slot_factors[slot] = group.multiplicity;
+                next[v as usize] += 1;
+            }
+        }
+        self.starts = starts;
+    }
+
+    /// Number of patches that are evaluated.
+    #[must_use]
+    pub fn patch_count(&self) -> usize {
+        self.patch_count
+    }
+
+    /// Number of samples of one evaluation.
+    #[must_use]
+    pub fn sample_count(&self) -> usize {
+        self.groups
+            .iter()
+            .map(|g| {
+                g.patches()
+                    * match &g.rule {
+                        Rule::Separable(rule) => rule.nodes * rule.nodes,
+                        Rule::Table(table) => table.samples,
+                    }
+            })
+            .sum()
+    }
+
+    pub(crate) fn groups(&self) -> &[Group] {
+        &self.groups
+    }
+
+    pub(crate) fn arch(&self) -> Arch {
+        self.arch
+    }
+
+    /// Number of patches of the whole surface, copies included.
+    pub(crate) fn weighted_patches(&self) -> f64 {
+        self.groups.iter().map(|g| g.multiplicity * g.patches() as f64).sum()
+    }
+
+    /// The area.
+    #[must_use]
+    pub fn area(&self, positions: &[f64], work: &mut Workspace) -> f64 {
+        self.pass(positions, Task::Area, work)[0]
+    }
+
+    /// Area and gradient of the area.
+    pub(crate) fn area_gradient(
+        &self,
+        positions: &[f64],
+        work: &mut Workspace,
+        gradient: &mut [f64],
+    ) -> f64 {
+        let [area, _] = self.pass(positions, Task::Gradient(&Density::default()), work);
+        self.gather(work, 0.0, 1.0, gradient);
+        area
+    }
+
+    /// The energy.
+    #[must_use]
+    pub fn energy(&self, energy: &Energy, positions: &[f64], work: &mut Workspace) -> f64 {
+        let Coefficients { area: c, mut plain, scaled } = energy.coefficients();
+        if plain.is_zero() {
+            let [area, integral] = self.pass(positions, Task::Energy(&scaled), work);
+            return c * area + area * integral;
+        }
+        let area = self.area(positions, work);
+        fix_epsilon(&mut plain, area);
+        let density = plain.plus(area, &scaled);
+        c * area + self.pass(positions, Task::Energy(&density), work)[1]
+    }
+
+    /// The energy and its gradient by the control points' coordinates.
+    ///
+    /// The regularisation of [`Functional::Sqrt`] is taken relative to the area and held fixed
+    /// while differentiating; `epsilon_area` is that area, to be kept during a line search.
+    ///
+    /// # Panics
+    /// If a slice does not hold three numbers per vertex.
+    pub fn gradient(
+        &self,
+        energy: &Energy,
+        positions: &[f64],
+        epsilon_area: Option<f64>,
+        work: &mut Workspace,
+        gradient: &mut [f64],
+    ) -> f64 {
+        assert_eq!(gradient.len(), 3 * self.vertex_count, "three coordinates per vertex");
+        let Coefficients { area: c, mut plain, scaled } = energy.coefficients();
+        if plain.root != 0.0 {
+            let area = epsilon_area.unwrap_or_else(|| self.area(positions, work));
+            fix_epsilon(&mut plain, area);
+        }
+        if plain.is_zero() {
+            let [area, integral] = self.pass(positions, Task::Gradient(&scaled), work);
+            self.gather(work, area, integral + c, gradient);
+            c * area + area * integral
+        } else if scaled.is_zero() {
+            let [area, integral] = self.pass(positions, Task::Gradient(&plain), work);
+            self.gather(work, 1.0, c, gradient);
+            c * area + integral
+        } else {
+            // d(∫p + A ∫s) = d∫(p + A s) with A held, plus (∫s) dA; ∫s follows from an energy pass
+            // of p, which is cheaper than a third set of adjoints.
+            let area = self.area(positions, work);
+            let plain_integral = self.pass(positions, Task::Energy(&plain), work)[1];
+            let density = plain.plus(area, &scaled);
+            let [_, integral] = self.pass(positions, Task::Gradient(&density), work);
+            let scaled_integral = (integral - plain_integral) / area;
+            self.gather(work, 1.0, c + scaled_integral, gradient);
+            c * area + integral
+        }
+    }
+
+    /// All functionals at once.
+    #[must_use]
+    pub fn table(&self, positions: &[f64], work: &mut Workspace) -> EnergyTable {
+        let area = self.area(positions, work);
+        let value = |functional: Functional, work: &mut Workspace| {
+            if functional == Functional::Area {
+                return area;
+            }
+            let (mut density, scaled) = functional.density();
+            fix_epsilon(&mut density, area);
+            let [_, integral] = self.pass(positions, Task::Energy(&density), work);
+            if scaled { area * integral } else { integral }
+        };
+        let values = Functional::ALL.map(|f| (f, value(f, work))).to_vec();
+        EnergyTable { values }
+    }
+
+    /// `∫ |K| dA`, the scale a Gauss-Bonnet residual is compared with.
+    #[must_use]
+    pub fn absolute_gaussian(&self, positions: &[f64], work: &mut Workspace) -> f64 {
+        let density = Density { absolute: 1.0, ..Density::default() };
+        self.pass(positions, Task::Energy(&density), work)[1]
+    }
+
+    /// Area and integral of the task's density; a gradient pass leaves the patches' gradients in
+    /// the workspace.
+    fn pass(&self, positions: &[f64], task: Task<'_>, work: &mut Workspace) -> [f64; 2] {
+        assert_eq!(positions.len(), 3 * self.vertex_count, "three coordinates per vertex");
+        let with_gradient = matches!(task, Task::Gradient(_));
+        work.integrals.resize(self.patch_count, [0.0; 2]);
+        if with_gradient {
+            work.gradients.resize(GRADIENT_LEN * self.slot_count, 0.0);
+        }
+        let mut integrals = &mut work.integrals[..];
+        let mut gradients = if with_gradient { &mut work.gradients[..] } else { &mut [][..] };
+        let mut runs = Vec::new();
+        for group in &self.groups {
+            let patches = group.patches();
+            let (now, rest) = std::mem::take(&mut integrals).split_at_mut(patches);
+            integrals = rest;
+            let width = if with_gradient { GRADIENT_LEN * group.per_patch } else { 0 };
+            let (mut slots, rest) = std::mem::take(&mut gradients).split_at_mut(width * patches);
+            gradients = rest;
+            let run = if matches!(group.rule, Rule::Separable(_)) { RUN } else { 1 };
+            for (integrals, controls) in
+                now.chunks_mut(run).zip(group.controls.chunks(run * group.per_patch))
+            {
+                let (now, rest) = std::mem::take(&mut slots).split_at_mut(width * integrals.len());
+                slots = rest;
+                runs.push((group, controls, integrals, now));
+            }
+        }
+        let arch = self.arch;
+        runs.into_par_iter().for_each(|(group, controls, integrals, gradients)| {
+            let per_patch = group.per_patch;
+            match &group.rule {
+                Rule::Separable(rule) => arch.dispatch(PatchRun {
+                    rule,
+                    task,
+                    positions,
+                    controls,
+                    per_patch,
+                    integrals,
+                    gradients,
+                }),
+                Rule::Table(rule) => arch.dispatch(PatchRun {
+                    rule,
+                    task,
+                    positions,
+                    controls,
+                    per_patch,
+                    integrals,
+                    gradients,
+                }),
+            }
+        });
+        let mut total = [0.0; 2];
+        for group in &self.groups {
+            let range = group.first_patch..group.first_patch + group.patches();
+            for [a, i] in &work.integrals[range] {
+                total[0] += group.multiplicity * a;
+                total[1] += group.multiplicity * i;
+            }
+        }
+        total
+    }
+
+    /// `out = f · ∂∫ + g · ∂A` from the last gradient pass.
+    fn gather(&self, work: &Workspace, f: f64, g: f64, out: &mut [f64]) {
+        out.par_chunks_mut(3).with_min_len(256).enumerate().for_each(|(v, out)| {
+            let mut sum = [0.0; 3];
+            for &slot in &self.slots[self.starts[v] as usize..self.starts[v + 1] as usize] {
+                let at = GRADIENT_LEN * slot as usize;
+                let factor = self.slot_factors[slot as usize];
+                for c in 0..3 {
+                    sum[c] +=
+                        factor * (f * work.gradients[at + c] + g * work.gradients[at + 3 + c]);
+                }
+            }
+            out.copy_from_slice(&sum);
+        });
+    }
+}
+
+// The regularisation is a share of the area so that the functional stays scale invariant.
+fn fix_epsilon(density: &mut Density, area: f64) {
+    if density.root != 0.0 {
+        density.root_epsilon = crate::functional::ROOT_EPSILON / area;
+    }
+}
+
+/// Coordinates of points as a flat list.
+#[must_use]
+pub(crate) fn flatten(points: &[geom_core::DVec3]) -> Vec<f64> {
+    points.iter().flat_map(|p| p.to_array()).collect()
+}
+
+/// Points from a flat list of coordinates.
+pub(crate) fn unflatten(coordinates: &[f64]) -> Vec<geom_core::DVec3> {
+    coordinates.chunks_exact(3).map(|c| geom_core::DVec3::new(c[0], c[1], c[2])).collect()
+}

@@ -1,0 +1,442 @@
+//! Metrics for the descent: the Gauss-Newton Hessian and a Sobolev norm, assembled and factored.
+
+use crate::density::{Density, Derivatives, FrameAdjoint, Shape};
+use crate::evaluator::{Group, Rule, SurfaceEnergy};
+use crate::freedom::Freedom;
+use crate::lanes::Lanes;
+use crate::rules::{MAX_LANES, Table};
+use gp_solver::{SolverError, SparseCholesky, SymmetricPattern};
+use pulp::{Simd, WithSimd};
+use rayon::prelude::*;
+use subdiv_catmull_clark::SubdivisionSurface;
+
+/// Gauss points per side the metrics use: they need not be exact.
+const REGULAR_NODES: usize = 4;
+const EXTRAORDINARY_NODES: usize = 8;
+/// Element matrices computed at a time before they are added up.
+const BATCH: usize = 64;
+/// `ℓ²` of the Sobolev norm as a share of the area.
+const LENGTH_SQUARED: f64 = 1.0 / 40.0;
+/// Area elements below this share of the mean are raised to it.
+const LEAST_AREA: f64 = 1e-3;
+
+/// `gauss_newton · (Gauss-Newton Hessian of a density) + sobolev · (H³ norm)`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Mixture {
+    pub(crate) density: Density,
+    pub(crate) gauss_newton: bool,
+    pub(crate) sobolev: f64,
+}
+
+/// A metric on the unknowns, with the structure of its matrix worked out once.
+pub(crate) struct MetricAssembly {
+    tables: Vec<Table>,
+    cholesky: SparseCholesky,
+    // For every ordered pair of a patch's control points and every unknown of the second one, where
+    // the first unknown of the first one stands; patch after patch.
+    slots: Vec<u32>,
+}
+
+impl MetricAssembly {
+    /// Works out the structure.
+    ///
+    /// # Errors
+    /// [`SolverError::OutOfMemory`].
+    pub(crate) fn new(
+        surface: &SubdivisionSurface,
+        evaluator: &SurfaceEnergy,
+        freedom: &Freedom,
+    ) -> Result<Self, SolverError> {
+        let tables = evaluator
+            .groups()
+            .par_iter()
+            .map(|group| {
+                let nodes = if matches!(group.rule, Rule::Separable(_)) {
+                    REGULAR_NODES
+                } else {
+                    EXTRAORDINARY_NODES
+                };
+                Table::new(surface, group.basis, nodes)
+            })
+            .collect();
+        let mut pairs = Vec::new();
+        for_pairs(evaluator.groups(), freedom, |a, b| pairs.push((a as u32, b as u32)));
+        pairs.sort_unstable();
+        pairs.dedup();
+        let entries = pairs.iter().flat_map(|&(a, b)| {
+            let (a, b) = (a as usize, b as usize);
+            let (i0, j0) = (freedom.start[a] as usize, freedom.start[b] as usize);
+            (0..freedom.dim[b] as usize)
+                .flat_map(move |j| (0..freedom.dim[a] as usize).map(move |i| (i0 + i, j0 + j)))
+        });
+        let pattern = SymmetricPattern::new(freedom.len(), entries)?;
+        drop(pairs);
+        let mut slots = Vec::new();
+        for_pairs(evaluator.groups(), freedom, |a, b| {
+            let (i0, j0) = (freedom.start[a] as usize, freedom.start[b] as usize);
+            for j in 0..freedom.dim[b] as usize {
+                // On the diagonal the rows of a column start at the column itself.
+                let slot = pattern.slot(i0.max(j0 + usize::from(i0 == j0) * j), j0 + j);
+                slots.push(slot.unwrap_or(0) as u32);
+            }
+        });
+        slots.shrink_to_fit();
+        Ok(Self { tables, cholesky: SparseCholesky::new(pattern)?, slots })
+    }
+
+    /// Number of stored values of the factor.
+    pub(crate) fn factor_len(&self) -> usize {
+        self.cholesky.factor_len()
+    }
+
+    /// Assembles and factors the metric at `positions`.
+    ///
+    /// # Errors
+    /// [`SolverError::NotPositiveDefinite`].
+    pub(crate) fn factor(
+        &mut self,
+        evaluator: &SurfaceEnergy,
+        freedom: &Freedom,
+        positions: &[f64],
+        area: f64,
+        mixture: &Mixture,
+    ) -> Result<(), SolverError> {
+        let mut values = vec![0.0; self.cholesky.pattern().len()];
+        let mut next_slot = 0;
+        let mean_area = area / evaluator.weighted_patches();
+        for (group, table) in evaluator.groups().iter().zip(&self.tables) {
+            let width = element_width(group.per_patch);
+            for controls in group.controls.chunks(BATCH * group.per_patch) {
+                let mut matrices = vec![0.0; controls.len() / group.per_patch * width * width];
+                matrices
+                    .par_chunks_mut(width * width)
+                    .zip(controls.par_chunks(group.per_patch))
+                    .for_each(|(matrix, controls)| {
+                        evaluator.arch().dispatch(ElementMatrix {
+                            table,
+                            mixture,
+                            positions,
+                            controls,
+                            area,
+                            least_area: LEAST_AREA * mean_area,
+                            matrix,
+                        });
+                    });
+                for (matrix, controls) in
+                    matrices.chunks(width * width).zip(controls.chunks(group.per_patch))
+                {
+                    next_slot = self.scatter(
+                        matrix,
+                        width,
+                        controls,
+                        group.multiplicity,
+                        freedom,
+                        next_slot,
+                        &mut values,
+                    );
+                }
+            }
+        }
+        // Keeps unknowns that nothing sees from making the matrix singular.
+        let starts = self.cholesky.pattern().column_starts();
+        let size = freedom.len();
+        let trace: f64 = (0..size).map(|j| values[starts[j]]).sum();
+        for j in 0..size {
+            values[starts[j]] += 1e-12 * trace / size as f64;
+        }
+        self.cholesky.factor(&values)
+    }
+
+    pub(crate) fn solve_in_place(&self, rhs: &mut [f64]) {
+        self.cholesky.solve_in_place(rhs);
+    }
+
+    fn scatter(
+        &self,
+        matrix: &[f64],
+        width: usize,
+        controls: &[u32],
+        factor: f64,
+        freedom: &Freedom,
+        mut next_slot: usize,
+        values: &mut [f64],
+    ) -> usize {
+        for (p, &a) in controls.iter().enumerate() {
+            let a = a as usize;
+            let (i0, rows) = (freedom.start[a], freedom.dim[a] as usize);
+            for (q, &b) in controls.iter().enumerate() {
+                let b = b as usize;
+                let (j0, columns) = (freedom.start[b], freedom.dim[b] as usize);
+                if rows == 0 || columns == 0 || i0 < j0 {
+                    continue;
+                }
+                for j in 0..columns {
+                    let slot = self.slots[next_slot] as usize;
+                    next_slot += 1;
+                    let direction = freedom.frame[b].col(j).to_array();
+                    let image: [f64; 3] = std::array::from_fn(|c| {
+                        (0..3)
+                            .map(|d| {
+                                // Only the upper triangle of the element is filled.
+                                let (r, s) = (3 * p + c, 3 * q + d);
+                                matrix[r.min(s) * width + r.max(s)] * direction[d]
+                            })
+                            .sum()
+                    });
+                    let first = if i0 == j0 { j } else { 0 };
+                    for i in first..rows {
+                        let row = freedom.frame[a].col(i).to_array();
+                        let value = row[0] * image[0] + row[1] * image[1] + row[2] * image[2];
+                        values[slot + i - first] += factor * value;
+                    }
+                }
+            }
+        }
+        next_slot
+    }
+}
+
+// Ordered pairs of control points that have unknowns, the first one's not before the second one's.
+fn for_pairs(groups: &[Group], freedom: &Freedom, mut visit: impl FnMut(usize, usize)) {
+    for group in groups {
+        for controls in group.controls.chunks(group.per_patch) {
+            for &a in controls {
+                for &b in controls {
+                    let (a, b) = (a as usize, b as usize);
+                    if freedom.dim[a] > 0
+                        && freedom.dim[b] > 0
+                        && freedom.start[a] >= freedom.start[b]
+                    {
+                        visit(a, b);
+                    }
+                }
+            }
+        }
+    }
+}
+
+fn element_width(per_patch: usize) -> usize {
+    (3 * per_patch).next_multiple_of(MAX_LANES)
+}
+
+/// The matrix of one patch, upper triangle, rows padded to whole vectors.
+struct ElementMatrix<'a> {
+    table: &'a Table,
+    mixture: &'a Mixture,
+    positions: &'a [f64],
+    controls: &'a [u32],
+    area: f64,
+    least_area: f64,
+    matrix: &'a mut [f64],
+}
+
+impl WithSimd for ElementMatrix<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, simd: S) {
+        let count = self.controls.len();
+        let width = element_width(count);
+        let table = self.table;
+        let (values, _) = S::as_simd_f64s(&table.values);
+        let (weights, _) = S::as_simd_f64s(&table.weights);
+        let chunks = weights.len();
+        let zero = Lanes::splat(simd, 0.0);
+        let mut residuals = vec![0.0; MAX_LANES * 7 * width];
+        // Sums over samples of |∇ᵏ|² by order, for the Sobolev part.
+        let mut scalar = vec![0.0; count * count];
+        for chunk in 0..chunks {
+            let mut d: Derivatives<S> = [[zero; 3]; 9];
+            for (order, out) in d.iter_mut().enumerate() {
+                for (k, &v) in self.controls.iter().enumerate() {
+                    let t = Lanes(simd, values[(order * count + k) * chunks + chunk]);
+                    let p = &self.positions[3 * v as usize..3 * v as usize + 3];
+                    for c in 0..3 {
+                        out[c] = t.fma(Lanes::splat(simd, p[c]), out[c]);
+                    }
+                }
+            }
+            let shape = Shape::new(&d);
+            let weight = Lanes(simd, weights[chunk]);
+            if self.mixture.sobolev > 0.0 {
+                let (mut area, mut w) = ([0.0; MAX_LANES], [0.0; MAX_LANES]);
+                simd.partial_store_f64s(&mut area[..S::F64_LANES], shape.area.1);
+                simd.partial_store_f64s(&mut w[..S::F64_LANES], weight.1);
+                for lane in 0..S::F64_LANES {
+                    let sample = S::F64_LANES * chunk + lane;
+                    let j = area[lane].max(self.least_area);
+                    self.add_sobolev(sample, w[lane], j, &mut scalar);
+                }
+            }
+            if self.mixture.gauss_newton {
+                let rows =
+                    residual_rows(simd, &d, &shape, weight, &self.mixture.density, |row, at| {
+                        for k in 0..count {
+                            let mut sum = [zero; 3];
+                            for (order, adjoint) in row.iter().enumerate() {
+                                let t = Lanes(simd, values[(order * count + k) * chunks + chunk]);
+                                for c in 0..3 {
+                                    sum[c] = t.fma(adjoint[c], sum[c]);
+                                }
+                            }
+                            for c in 0..3 {
+                                let mut lanes = [0.0; MAX_LANES];
+                                simd.partial_store_f64s(&mut lanes[..S::F64_LANES], sum[c].1);
+                                for (lane, &value) in lanes[..S::F64_LANES].iter().enumerate() {
+                                    residuals[(at * S::F64_LANES + lane) * width + 3 * k + c] =
+                                        value;
+                                }
+                            }
+                        }
+                    });
+                add_outer_products(
+                    simd,
+                    &residuals[..rows * S::F64_LANES * width],
+                    width,
+                    3 * count,
+                    self.matrix,
+                );
+            }
+        }
+        if self.mixture.sobolev > 0.0 {
+            for p in 0..count {
+                for q in p..count {
+                    let value = self.mixture.sobolev * scalar[p * count + q];
+                    for c in 0..3 {
+                        self.matrix[(3 * p + c) * width + 3 * q + c] += value;
+                    }
+                }
+            }
+        }
+    }
+}
+
+impl ElementMatrix<'_> {
+    /// `A Σₖ ℓ^{2(k−3)} |∇ᵏ|²` for k = 1 to 3 with parameter derivatives scaled as if the map were
+    /// conformal: `|∇ᵏ f|² ≈ J^{−k} |∂ᵏ f|²`, times `J` for the area. The order 0 is added with the
+    /// unknowns' own weights to keep translations in.
+    #[inline(always)]
+    fn add_sobolev(&self, sample: usize, weight: f64, j: f64, scalar: &mut [f64]) {
+        let table = self.table;
+        let count = table.controls;
+        let length = LENGTH_SQUARED * self.area;
+        let orders: [(f64, i32); 9] = [
+            (1.0, 1),
+            (1.0, 1),
+            (1.0, 2),
+            (2.0, 2),
+            (1.0, 2),
+            (1.0, 3),
+            (3.0, 3),
+            (3.0, 3),
+            (1.0, 3),
+        ];
+        for (d, (factor, order)) in orders.into_iter().enumerate() {
+            let scale = self.area * weight * factor * j.powi(1 - order) * length.powi(order - 3);
+            for p in 0..count {
+                let a = scale * table.values[(d * count + p) * table.samples + sample];
+                for q in p..count {
+                    scalar[p * count + q] +=
+                        a * table.values[(d * count + q) * table.samples + sample];
+                }
+            }
+        }
+        // Order 0, lumped.
+        let mass = self.area * weight * j * length.powi(-3) / count as f64;
+        for p in 0..count {
+            scalar[p * count + p] += mass;
+        }
+    }
+}
+
+/// Adjoints of the weighted residuals `√(2 w J) f` of one vector of samples, one call of `emit`
+/// for each; returns how many there are.
+#[inline(always)]
+fn residual_rows<S: Simd>(
+    simd: S,
+    d: &Derivatives<S>,
+    shape: &Shape<S>,
+    weight: Lanes<S>,
+    w: &Density,
+    mut emit: impl FnMut(&Derivatives<S>, usize),
+) -> usize {
+    let zero = Lanes::splat(simd, 0.0);
+    let root_area = shape.area.sqrt();
+    let half = root_area.recip() * 0.5;
+    let root_weight = weight.sqrt();
+    let [l, m, q] = shape.second;
+    let mut rows = 0;
+    // Squares of the harmonics; the coupling term is left out, the root has its own weight.
+    let f = shape.harmonics;
+    let slope = if w.root != 0.0 {
+        let size = f[0].fma(f[0], f[1].fma(f[1], f[2].fma(f[2], f[3] * f[3])));
+        // Far from zero the second derivative along the gradient vanishes; this is its mean.
+        (size + Lanes::splat(simd, w.root_epsilon * w.root_epsilon)).sqrt().recip() * (0.5 * w.root)
+    } else {
+        zero
+    };
+    for k in 0..4 {
+        let c = if k < 2 { w.f1 } else { w.f3 };
+        if !(c > 0.0 || w.root > 0.0) {
+            continue;
+        }
+        let scale = ((Lanes::splat(simd, c.max(0.0)) + slope) * 2.0).sqrt() * root_weight;
+        let mut harmonics = [zero; 4];
+        harmonics[k] = root_area * scale;
+        let adjoint = FrameAdjoint { harmonics, second: [zero; 3], area: f[k] * half * scale };
+        emit(&shape.pull_back(d, &adjoint), rows);
+        rows += 1;
+    }
+    // The quadratic form in (l, m, q) along its eigenvectors: (l + q)/√2, (l − q)/√2, m.
+    let r = std::f64::consts::FRAC_1_SQRT_2;
+    let forms = [
+        (w.square + 0.5 * w.product, [r, 0.0, r], (l + q) * r),
+        (w.square - 0.5 * w.product, [r, 0.0, -r], (l - q) * r),
+        (w.twist, [0.0, 1.0, 0.0], m),
+    ];
+    for (c, along, value) in forms {
+        if c > 0.0 {
+            let scale = root_weight * (2.0 * c).sqrt();
+            let second = along.map(|x| root_area * scale * x);
+            let adjoint = FrameAdjoint { harmonics: [zero; 4], second, area: value * half * scale };
+            emit(&shape.pull_back(d, &adjoint), rows);
+            rows += 1;
+        }
+    }
+    rows
+}
+
+/// `matrix += RᵀR`, upper triangle up to whole vectors, four rows of `R` at a time.
+#[inline(always)]
+fn add_outer_products<S: Simd>(
+    simd: S,
+    rows: &[f64],
+    width: usize,
+    used: usize,
+    matrix: &mut [f64],
+) {
+    let mut blocks = rows.chunks_exact(4 * width);
+    for block in &mut blocks {
+        let r: [&[S::f64s]; 4] =
+            std::array::from_fn(|i| S::as_simd_f64s(&block[i * width..(i + 1) * width]).0);
+        for p in 0..used {
+            let from = p / S::F64_LANES;
+            let a: [S::f64s; 4] = std::array::from_fn(|i| simd.splat_f64s(block[i * width + p]));
+            let (out, _) = S::as_mut_simd_f64s(&mut matrix[p * width..(p + 1) * width]);
+            for q in from..out.len() {
+                let mut sum = out[q];
+                for i in 0..4 {
+                    sum = simd.mul_add_e_f64s(a[i], r[i][q], sum);
+                }
+                out[q] = sum;
+            }
+        }
+    }
+    for row in blocks.remainder().chunks_exact(width) {
+        for p in 0..used {
+            for q in p..width {
+                matrix[p * width + q] += row[p] * row[q];
+            }
+        }
+    }
+}

@@ -1,0 +1,149 @@
+//! Quadrature rules and the bases tabulated at their nodes.
+
+use subdiv_catmull_clark::{BasisId, SubdivisionSurface, cubic_basis};
+
+/// Widest vector the kernels meet; tables are padded to it.
+pub(crate) const MAX_LANES: usize = 8;
+
+/// Gauss-Legendre points per side of a patch.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
+pub struct Quadrature {
+    /// On bi-cubic patches.
+    pub regular: usize,
+    /// On patches with an extraordinary corner, at the boundary and at creases.
+    pub extraordinary: usize,
+}
+
+impl Quadrature {
+    /// For descending: 4×4 and 16×16 points.
+    pub const COARSE: Self = Self { regular: 4, extraordinary: 16 };
+    /// For reporting: 8×8 and 16×16 points.
+    pub const NORMAL: Self = Self { regular: 8, extraordinary: 16 };
+    /// The check on [`Self::NORMAL`]: 12×12 and 32×32 points.
+    pub const FINE: Self = Self { regular: 12, extraordinary: 32 };
+}
+
+impl Default for Quadrature {
+    fn default() -> Self {
+        Self::NORMAL
+    }
+}
+
+/// Nodes and weights of the `n`-point Gauss-Legendre rule on `[0, 1]`.
+pub(crate) fn gauss_legendre(n: usize) -> Vec<(f64, f64)> {
+    let mut rule = Vec::with_capacity(n);
+    for k in 0..n {
+        // Newton's iteration on the Legendre polynomial from the usual first guess.
+        let mut x = (std::f64::consts::PI * (k as f64 + 0.75) / (n as f64 + 0.5)).cos();
+        let mut slope = 1.0;
+        for _ in 0..100 {
+            let (mut before, mut now) = (1.0, x);
+            for i in 2..=n {
+                let i = i as f64;
+                (before, now) = (now, ((2.0 * i - 1.0) * x * now - (i - 1.0) * before) / i);
+            }
+            slope = n as f64 * (x * now - before) / (x * x - 1.0);
+            let step = now / slope;
+            x -= step;
+            if step.abs() < 1e-15 {
+                break;
+            }
+        }
+        rule.push((0.5 - 0.5 * x, 1.0 / ((1.0 - x * x) * slope * slope)));
+    }
+    rule
+}
+
+/// A tensor-product rule on bi-cubic patches, evaluated one direction after the other.
+#[derive(Clone, Debug)]
+pub(crate) struct SeparableRule {
+    pub(crate) nodes: usize,
+    /// Nodes rounded up to whole vectors.
+    pub(crate) padded: usize,
+    /// `basis[(4 d + k) · padded + node]`: derivative `d` of B-spline `k`.
+    pub(crate) basis: Vec<f64>,
+    /// `weights[u node · padded + v node]`, zero in the padding.
+    pub(crate) weights: Vec<f64>,
+    /// Position of grid point `4 i + j` among the patch's control points.
+    pub(crate) order: [usize; 16],
+}
+
+impl SeparableRule {
+    pub(crate) fn new(surface: &SubdivisionSurface, basis: BasisId, nodes: usize) -> Option<Self> {
+        let grid = surface.b_spline_grid(basis)?;
+        let order = std::array::from_fn(|k| grid[k][0].0);
+        let rule = gauss_legendre(nodes);
+        let padded = nodes.next_multiple_of(MAX_LANES);
+        let mut values = vec![0.0; 16 * padded];
+        let mut weights = vec![0.0; nodes * padded];
+        for node in 0..padded {
+            // The padding repeats the last node with weight zero, so that nothing divides by zero.
+            let table = cubic_basis(rule[node.min(nodes - 1)].0);
+            for (d, row) in table.iter().enumerate() {
+                for (k, &value) in row.iter().enumerate() {
+                    values[(4 * d + k) * padded + node] = value;
+                }
+            }
+        }
+        for (i, &(_, wu)) in rule.iter().enumerate() {
+            for (j, &(_, wv)) in rule.iter().enumerate() {
+                weights[i * padded + j] = wu * wv;
+            }
+        }
+        Some(Self { nodes, padded, basis: values, weights, order })
+    }
+}
+
+/// A basis tabulated at all nodes.
+#[derive(Clone, Debug)]
+pub(crate) struct Table {
+    /// Number of control points.
+    pub(crate) controls: usize,
+    /// Number of samples, a multiple of [`MAX_LANES`].
+    pub(crate) samples: usize,
+    /// `values[(d · controls + k) · samples + s]`: derivative `d` (the nine after the position) of
+    /// control point `k`'s weight at sample `s`.
+    pub(crate) values: Vec<f64>,
+    pub(crate) weights: Vec<f64>,
+}
+
+impl Table {
+    pub(crate) fn new(surface: &SubdivisionSurface, basis: BasisId, nodes: usize) -> Self {
+        let rule = gauss_legendre(nodes);
+        let samples = (nodes * nodes).next_multiple_of(MAX_LANES);
+        let controls = surface.weights(basis, 0.5, 0.5).control_points();
+        let mut values = vec![0.0; 9 * controls * samples];
+        let mut weights = vec![0.0; samples];
+        for s in 0..samples {
+            let node = s.min(nodes * nodes - 1);
+            let ((u, wu), (v, wv)) = (rule[node / nodes], rule[node % nodes]);
+            let table = surface.weights(basis, u, v);
+            for d in 0..9 {
+                for (k, &w) in table.row(d + 1).iter().enumerate() {
+                    values[(d * controls + k) * samples + s] = w;
+                }
+            }
+            if s < nodes * nodes {
+                weights[s] = wu * wv;
+            }
+        }
+        Self { controls, samples, values, weights }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn rules_integrate_polynomials_exactly() {
+        for n in [1, 2, 4, 8, 12, 16, 32] {
+            let rule = gauss_legendre(n);
+            for power in 0..2 * n {
+                let sum: f64 = rule.iter().map(|(x, w)| w * x.powi(power as i32)).sum();
+                let want = 1.0 / (power as f64 + 1.0);
+                assert!((sum - want).abs() < 1e-14, "{n} points, power {power}: {sum}");
+            }
+        }
+    }
+}
