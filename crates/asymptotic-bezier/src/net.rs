@@ -78,6 +78,7 @@ impl AsymptoticNet {
     /// Tangents and curvatures are those of the polynomials of degree up to four through the
     /// vertices of each mesh polyline, so a net sampled from a smooth parametrisation gives them
     /// to fourth order. Lines through a vertex are continued across it when its valence is even.
+    /// A curve whose curvature changes sign between its ends gets one inflection.
     ///
     /// # Errors
     /// [`AsymptoticError::Net`] when a face is not a quad, and the faults of
@@ -125,7 +126,9 @@ impl AsymptoticNet {
                         *arm = chord * (sign * arm.length() / chord.length());
                     }
                 }
-                NetCurve { ends: ends.map(VertexId::index), arms, curvatures, line, inflections: 0 }
+                // Equal signs mean opposite sides, because the arms point at one another.
+                let inflections = usize::from(!line && curvatures[0] * curvatures[1] > 0.0);
+                NetCurve { ends: ends.map(VertexId::index), arms, curvatures, line, inflections }
             })
             .collect();
         Self::new(mesh.positions().to_vec(), &quads, curves)

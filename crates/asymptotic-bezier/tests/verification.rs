@@ -130,3 +130,18 @@ fn four_straight_lines_give_the_bilinear_patch_or_a_plane() {
         }
     }
 }
+
+/// Across the neck of the catenoid every mesh line has an inflection.
+#[test]
+fn nets_across_inflections_join_without_kinks() {
+    let mesh = sampled_net(catenoid, [-0.7, 0.8, -0.4, 0.5], [5, 5]);
+    let net = AsymptoticNet::from_mesh(&mesh).unwrap();
+    assert!(net.curves().iter().any(|c| c.inflections == 1));
+    let options = GridshellOptions::default();
+    let shell = fill_net(&net, &options).unwrap();
+    let check = shell.verify(&net, &options.patch);
+    let sine = check.patches.iter().map(|p| p.sine).fold(1.0, f64::min);
+    println!("kink {:e} deg, sine {sine}, {:?}", check.kink().to_degrees(), check.warnings);
+    assert!(check.kink().to_degrees() <= 1e-8 && sine > 0.5);
+    assert!(check.patches.iter().all(|p| p.normal_curvature <= 1e-10));
+}
