@@ -78,6 +78,8 @@ pub enum MeshError {
 }
 
 const NONE: u32 = u32::MAX;
+/// How many faces of a non-manifold edge an error names.
+const NAMED_FACES: usize = 8;
 
 /// An oriented manifold polygon mesh as half-edges; vertices without a face are allowed.
 ///
@@ -165,8 +167,9 @@ impl PolyMesh {
             let (a, b) = (self.origin[*h], self.origin[self.next[*h] as usize]);
             (a, b) == ends || (b, a) == ends
         };
-        let faces: Vec<usize> =
-            (0..self.origin.len()).filter(on_edge).map(|h| self.face[h] as usize).collect();
+        // A few are enough to find the place, however many there are.
+        let faces = (0..self.origin.len()).filter(on_edge).map(|h| self.face[h] as usize);
+        let faces: Vec<usize> = faces.take(NAMED_FACES).collect();
         let (from, to) = (ends.0 as usize, ends.1 as usize);
         if faces.len() > 2 {
             return MeshError::NonManifoldEdge { from, to, faces };

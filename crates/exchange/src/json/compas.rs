@@ -9,9 +9,11 @@ use crate::obj::clip;
 use crate::wrapped::{Direction, unwrap, wrapped};
 use bspline::{BsplineSurface, Degree, KnotVector, SplineError};
 use geom_core::DVec3;
-use serde::Deserialize;
+use serde::de::{Error, Visitor};
+use serde::{Deserialize, Deserializer};
 use serde_json::{Value, json};
 use std::collections::BTreeMap;
+use std::fmt;
 
 #[derive(Deserialize)]
 struct Item {
@@ -28,8 +30,8 @@ struct Item {
 #[serde(default)]
 struct Data {
     attributes: Attributes,
-    vertex: BTreeMap<String, Vertex>,
-    face: BTreeMap<String, Vec<VertexKey>>,
+    vertex: BTreeMap<Key, Vertex>,
+    face: BTreeMap<Key, Vec<Key>>,
     points: Vec<Vec<[f64; 3]>>,
     weights: Option<Vec<Vec<f64>>>,
     knots_u: Vec<f64>,
@@ -56,12 +58,31 @@ struct Vertex {
     z: f64,
 }
 
-/// A vertex by its number, as COMPAS 2 writes it, or by the text of it.
-#[derive(Deserialize)]
-#[serde(untagged)]
-enum VertexKey {
-    Number(u64),
-    Text(String),
+/// The number of a vertex or face, which is a text where JSON allows nothing else.
+#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+struct Key(u64);
+
+impl<'de> Deserialize<'de> for Key {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        struct KeyVisitor;
+        impl Visitor<'_> for KeyVisitor {
+            type Value = Key;
+
+            fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+                f.write_str("the number of a vertex or face")
+            }
+
+            fn visit_u64<E: Error>(self, number: u64) -> Result<Key, E> {
+                Ok(Key(number))
+            }
+
+            fn visit_str<E: Error>(self, text: &str) -> Result<Key, E> {
+                let wrong = || E::custom(format!("`{}` is not a number", clip(text)));
+                text.parse().map(Key).map_err(|_| wrong())
+            }
+        }
+        deserializer.deserialize_any(KeyVisitor)
+    }
 }
 
 pub(super) fn read(text: &str) -> Result<Model, ReadError> {
@@ -94,16 +115,10 @@ pub(super) fn read(text: &str) -> Result<Model, ReadError> {
 
 /// Vertices and faces in the order of their numbers.
 fn mesh(item: Item, title: &str) -> Result<Mesh, ReadError> {
-    let by_number = |key: &str| key.parse::<u64>().map_err(|_| key.to_owned());
-    let mut vertices: Vec<(Result<u64, String>, Vertex)> =
-        item.data.vertex.into_iter().map(|(key, v)| (by_number(&key), v)).collect();
-    vertices.sort_by(|a, b| a.0.cmp(&b.0));
-    let mut faces: Vec<(Result<u64, String>, Vec<VertexKey>)> =
-        item.data.face.into_iter().map(|(key, f)| (by_number(&key), f)).collect();
-    faces.sort_by(|a, b| a.0.cmp(&b.0));
+    let (keys, vertices): (Vec<Key>, Vec<Vertex>) = item.data.vertex.into_iter().unzip();
     let mut mesh = Mesh {
         name: item.name.or(item.data.attributes.name).unwrap_or_default(),
-        positions: vertices.iter().map(|(_, v)| DVec3::new(v.x, v.y, v.z)).collect(),
+        positions: vertices.iter().map(|v| DVec3::new(v.x, v.y, v.z)).collect(),
         ..Mesh::default()
     };
     if mesh.positions.is_empty() {
@@ -113,21 +128,14 @@ fn mesh(item: Item, title: &str) -> Result<Mesh, ReadError> {
         ));
     }
     let mut corners = Vec::new();
-    for (f, (_, keys)) in faces.iter().enumerate() {
+    for (f, face) in item.data.face.into_values().enumerate() {
         corners.clear();
-        for key in keys {
-            let key = match key {
-                VertexKey::Number(number) => Ok(*number),
-                VertexKey::Text(text) => by_number(text),
+        for key in face {
+            let Ok(index) = keys.binary_search(&key) else {
+                let what = format!("{title}: face {f} names vertex {}, which is not there", key.0);
+                return Err(ReadError::content(what, "export the mesh again"));
             };
-            match vertices.binary_search_by(|(k, _)| k.cmp(&key)) {
-                Ok(index) => corners.push(index as u32),
-                Err(_) => {
-                    let key = key.map_or_else(|text| clip(&text), |number| number.to_string());
-                    let what = format!("{title}: face {f} names vertex {key}, which is not there");
-                    return Err(ReadError::content(what, "export the mesh again"));
-                }
-            }
+            corners.push(index as u32);
         }
         if corners.len() < 3 {
             let what = format!("{title}: face {f} has {} corners", corners.len());
