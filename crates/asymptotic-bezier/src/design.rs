@@ -5,7 +5,7 @@ use crate::data::{AsymptoticNet, CURVE_CORNERS, CornerData};
 use crate::error::{AsymptoticError, Place};
 use crate::gridshell::{Gridshell, GridshellCheck, GridshellOptions, fill_net};
 use crate::patch::{PatchOptions, fill_patch};
-use crate::quad::{Quadrilateral, solve_quadrilateral};
+use crate::quad::{Quadrilateral, doubt_signs, solve_quadrilateral};
 use crate::quartic::solve_quartic_quadrilateral;
 use crate::relax::{RelaxOptions, Relaxed, relax};
 
@@ -79,8 +79,12 @@ fn design_patch(data: &CornerData, options: &DesignOptions) -> Result<Design, As
         None => (data.clone(), solve_quadrilateral(data, &options.boundary)?, None),
     };
     let net = data.to_net(&quad.curvatures);
+    let doubt = (options.boundary.degree > 4)
+        .then(|| doubt_signs(&data, &quad, &options.boundary))
+        .flatten();
     let shell = shell_of_one(&net, quad, &options.patch)?;
-    let check = shell.verify(&net, &options.patch);
+    let mut check = shell.verify(&net, &options.patch);
+    check.warnings.extend(doubt);
     Ok(Design { net, shell, check, relaxed })
 }
 

@@ -66,7 +66,7 @@ pub use gridshell::{Gridshell, GridshellCheck, GridshellOptions, JoinCheck, fill
 pub use lamella::{Lamella, LamellaNode, LamellaOptions, StripLayout, lamellas, strip_layout};
 pub use mask::Interior;
 pub use patch::{Ansatz, FilledPatch, PatchBoundary, PatchOptions, fill_patch};
-pub use quad::{Quadrilateral, solve_quadrilateral};
+pub use quad::{Quadrilateral, doubt_signs, solve_quadrilateral};
 pub use quartic::solve_quartic_quadrilateral;
 pub use relax::{RelaxOptions, Relaxed, relax};
 pub use surface::{Patch, PatchJet};

@@ -76,7 +76,7 @@ impl Quadrilateral {
 ///
 /// With unsigned curvatures all sign branches (one sign per curve, 16 for four curved sides) are
 /// solved and the one whose binormals turn least is taken, ties by strain energy. With signed
-/// curvatures the signs are kept, and a warning says when another branch turns by less than half.
+/// curvatures the signs are kept; [`doubt_signs`] tells whether others would be better.
 ///
 /// # Errors
 /// The hard faults of [`AsymptoticError`].
@@ -109,35 +109,41 @@ pub fn solve_quadrilateral(
     options: &BoundaryOptions,
 ) -> Result<Quadrilateral, AsymptoticError> {
     match data.curvatures {
-        Curvatures::Signed(k) => {
-            let mut quad = solve_signed(data, &k, options)?;
-            let free: Vec<usize> = (0..4).filter(|i| !data.lines[*i]).collect();
-            if let Some(best) = best_branch(data, &k, options)
-                && best.turning() * BRANCH_RATIO < quad.turning()
-            {
-                let signs: Vec<String> = free
-                    .iter()
-                    .map(|i| {
-                        let k = best.curvatures[*i];
-                        let sign = |x: f64| if x > 0.0 { '+' } else { '-' };
-                        format!("r{} {}{}", i + 1, sign(k[0]), sign(k[1]))
-                    })
-                    .collect();
-                quad.warnings.push(AsymptoticWarning::BetterBranch {
-                    place: Place::Patch(0),
-                    signs: signs.join(", "),
-                    best_degrees: best.turning().to_degrees(),
-                    degrees: quad.turning().to_degrees(),
-                });
-            }
-            Ok(quad)
-        }
+        Curvatures::Signed(k) => solve_signed(data, &k, options),
         Curvatures::Unsigned(k) => match best_branch(data, &k, options) {
             Some(quad) => Ok(quad),
             // No branch can be solved: the first one tells why.
             None => solve_signed(data, &branch(&k, data, 0), options),
         },
     }
+}
+
+/// A warning when other curvature signs make the binormals turn by less than half; solves all
+/// sign branches, so it belongs to the verification of a patch.
+#[must_use]
+pub fn doubt_signs(
+    data: &CornerData,
+    quad: &Quadrilateral,
+    options: &BoundaryOptions,
+) -> Option<AsymptoticWarning> {
+    let best = best_branch(data, &quad.curvatures, options)?;
+    if best.turning() * BRANCH_RATIO >= quad.turning() {
+        return None;
+    }
+    let signs: Vec<String> = (0..4)
+        .filter(|i| !data.lines[*i])
+        .map(|i| {
+            let sign = |x: f64| if x > 0.0 { '+' } else { '-' };
+            let [start, end] = best.curvatures[i].map(sign);
+            format!("r{} {start}{end}", i + 1)
+        })
+        .collect();
+    Some(AsymptoticWarning::BetterBranch {
+        place: Place::Patch(0),
+        signs: signs.join(", "),
+        best_degrees: best.turning().to_degrees(),
+        degrees: quad.turning().to_degrees(),
+    })
 }
 
 /// Curvatures of branch `b`: bit `i` makes curve `i` bend out of the patch at its start.

@@ -33,11 +33,7 @@ fn hand_made_and_random_sets_are_warned_about() {
         let turning =
             |w: &AsymptoticWarning| matches!(w, AsymptoticWarning::BinormalTurning { .. });
         assert!(quad.warnings.iter().any(turning), "{name}");
-        let branch = |w: &AsymptoticWarning| matches!(w, AsymptoticWarning::BetterBranch { .. });
         println!("{name} {:?}", quad.warnings);
-        if name == "E_" {
-            assert!(quad.warnings.iter().any(branch));
-        }
         let options = PatchOptions { degree: Some(7), ..Default::default() };
         let filled = fill_patch(&quad.boundary, &options, Place::Patch(0)).unwrap();
         let check = PatchCheck::new(&filled.patch, &quad.boundary);
@@ -144,4 +140,19 @@ fn nets_across_inflections_join_without_kinks() {
     println!("kink {:e} deg, sine {sine}, {:?}", check.kink().to_degrees(), check.warnings);
     assert!(check.kink().to_degrees() <= 1e-8 && sine > 0.5);
     assert!(check.patches.iter().all(|p| p.normal_curvature <= 1e-10));
+}
+
+#[test]
+fn results_do_not_depend_on_the_number_of_threads() {
+    let net = exact_net(catenoid, [0.2, 1.4, -0.1, 0.9], [4, 3]);
+    let run = |threads: usize| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+        pool.install(|| {
+            let options = GridshellOptions::default();
+            let shell = fill_net(&net, &options).unwrap();
+            let check = shell.verify(&net, &options.patch);
+            (shell, check)
+        })
+    };
+    assert_eq!(run(1), run(3));
 }
