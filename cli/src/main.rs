@@ -6,6 +6,8 @@ mod commands;
 mod config;
 mod context;
 mod failure;
+mod net_files;
+mod net_report;
 mod outcome;
 mod report_support;
 

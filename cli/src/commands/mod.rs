@@ -10,6 +10,7 @@ mod asymptotic;
 mod convert;
 mod demo;
 mod fit;
+mod hnet;
 mod weingarten;
 
 use crate::context::Context;
@@ -55,4 +56,6 @@ commands! {
     fit::Fit,
     /// Optimise a B-spline surface towards a Weingarten surface
     weingarten::Weingarten,
+    /// Turn quads along asymptotic directions into a smooth skin of ruled patches
+    hnet::Hnet,
 }

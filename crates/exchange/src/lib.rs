@@ -23,12 +23,14 @@ mod glb;
 mod json;
 mod mesh;
 mod model;
+mod net;
 mod obj;
 mod off;
 mod ply;
 mod ron_text;
 mod sample;
 mod scene;
+mod segments;
 mod step;
 mod stl;
 mod triangulate;
@@ -46,12 +48,14 @@ pub use model::{
     Model, NamedSurface, PointGrid, READABLE, WRITABLE, check_format, decode_model, encode_model,
     extension_of, read_model,
 };
+pub use net::{Net, read_net, write_net};
 pub use obj::{read_obj, write_obj};
 pub use off::read_off;
 pub use ply::{read_ply, write_ply};
 pub use ron_text::{from_ron, read_ron, to_ron};
 pub use sample::surface_mesh;
 pub use scene::{read_scene, write_scene};
+pub use segments::{Segment, write_segments_csv, write_segments_dxf};
 pub use step::{read_step, write_step};
 pub use stl::{read_stl, write_stl};
 pub use unit::LengthUnit;

@@ -134,7 +134,8 @@ mod tests {
         net.shape_parameters = vec![-1.0];
         let error = read_net(&write_net(&net).unwrap()).unwrap_err();
         assert!(error.to_string().starts_with("shape parameter 0 is -1"), "{error}");
-        let error = read_net("(vertices: [(0, 0, inf)], quads: [], shape_parameters: [])").unwrap_err();
+        let error =
+            read_net("(vertices: [(0, 0, inf)], quads: [], shape_parameters: [])").unwrap_err();
         assert!(error.to_string().starts_with("vertex 0 is"), "{error}");
         let error = read_net("(unit: \"furlong\", vertices: [], quads: [], shape_parameters: [])");
         assert!(error.unwrap_err().to_string().contains("furlong"));

@@ -35,7 +35,8 @@ pub fn wire_cuts(surface: &HyperbolicNet, positions: usize) -> Result<Vec<WireCu
         for family in [1, 2] {
             for index in 0..positions {
                 let t = index as f64 / (positions - 1) as f64;
-                let ends = if family == 1 { patch.ruling_along_v(t) } else { patch.ruling_along_u(t) };
+                let ends =
+                    if family == 1 { patch.ruling_along_v(t) } else { patch.ruling_along_u(t) };
                 cuts.push(WireCut { face, family, index, ends });
             }
         }
@@ -108,7 +109,8 @@ mod tests {
     fn wire_lies_on_the_panel() {
         let net = fixtures::asymptotic_nets::moutard(2, 1, 3);
         let mesh = geom_core::PolyMesh::new(net.positions, &net.quads).unwrap();
-        let surface = HyperbolicNet::new(QuadNet::new(&mesh).unwrap(), None, vec![1.2, 0.9]).unwrap();
+        let surface =
+            HyperbolicNet::new(QuadNet::new(&mesh).unwrap(), None, vec![1.2, 0.9]).unwrap();
         let cuts = wire_cuts(&surface, 5).unwrap();
         assert_eq!(cuts.len(), 2 * 2 * 5);
         for cut in cuts {

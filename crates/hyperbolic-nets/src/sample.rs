@@ -89,9 +89,10 @@ impl SampledPatches {
     /// Largest and smallest value of a quantity over all samples, `(min, max)`.
     #[must_use]
     pub fn range(&self, quantity: impl Fn(&SurfaceSample) -> f64) -> (f64, f64) {
-        self.samples.iter().map(quantity).fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), x| {
-            (a.min(x), b.max(x))
-        })
+        self.samples
+            .iter()
+            .map(quantity)
+            .fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), x| (a.min(x), b.max(x)))
     }
 }
 

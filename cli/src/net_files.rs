@@ -1,0 +1,159 @@
+//! Quad nets in and hyperbolic nets out, for the commands that work on them.
+
+use crate::failure::Failure;
+use crate::outcome::Status;
+use exchange::{Field, LengthUnit, Mesh, Model, NamedSurface, Net, Segment};
+use geom_core::{DVec3, PolyMesh};
+use hyperbolic_nets::{HyperbolicNet, PatchJet, QuadNet, SampledPatches};
+use std::path::{Path, PathBuf};
+
+/// Formats of the commands on nets.
+pub(crate) const NET_OUTPUTS: [&str; 7] = ["ron", "step", "stp", "obj", "glb", "csv", "dxf"];
+
+/// What an input holds.
+pub(crate) enum NetInput {
+    /// A net file: patches are known.
+    Net(Box<HyperbolicNet>),
+    /// Faces of a mesh.
+    Mesh(PolyMesh),
+}
+
+/// Reads a net file (`.ron`) or the one mesh of a file.
+pub(crate) fn read(path: &Path) -> Result<(NetInput, LengthUnit, Vec<String>), Failure> {
+    let refused = |e: &dyn std::fmt::Display| Failure::input(path, e);
+    if exchange::extension_of(path) == "ron" {
+        let text = exchange::read_text(path).map_err(|e| refused(&e))?;
+        let net = exchange::read_net(&text).map_err(|e| refused(&e))?;
+        let mesh = net.to_poly_mesh().map_err(|e| refused(&e))?;
+        let quads = QuadNet::new(&mesh).map_err(|e| refused(&e))?;
+        if quads.quads() != net.quads.as_slice() || quads.positions().len() != net.vertices.len() {
+            // Turned corners would exchange W and 1/W, dropped vertices shift the normals.
+            return Err(refused(
+                &"corners do not start along the first family in every face, or a vertex has no face; write the net with `umbilic hnet`",
+            ));
+        }
+        let normals = (!net.normals.is_empty()).then_some(net.normals);
+        let surface =
+            HyperbolicNet::new(quads, normals, net.shape_parameters).map_err(|e| refused(&e))?;
+        return Ok((NetInput::Net(Box::new(surface)), net.unit, Vec::new()));
+    }
+    let (mesh, unit, warnings) = read_mesh(path)?;
+    Ok((NetInput::Mesh(mesh), unit, warnings))
+}
+
+/// Reads the one mesh of a file.
+pub(crate) fn read_mesh(path: &Path) -> Result<(PolyMesh, LengthUnit, Vec<String>), Failure> {
+    let model = exchange::read_model(path).map_err(|e| Failure::input(path, e))?;
+    let mut with_faces = model.meshes.iter().filter(|m| !m.faces.is_empty());
+    let (Some(mesh), None) = (with_faces.next(), with_faces.next()) else {
+        return Err(Failure::input(
+            path,
+            "the file must hold one mesh with faces, no more and no less",
+        ));
+    };
+    let mesh = mesh.to_poly_mesh().map_err(|e| Failure::input(path, e))?;
+    Ok((mesh, model.unit, model.warnings))
+}
+
+/// Refuses outputs that could not be written at the end.
+pub(crate) fn check_outputs(outputs: &[PathBuf], known: &[&str]) -> Result<(), Failure> {
+    for path in outputs {
+        let extension = exchange::extension_of(path);
+        if !known.contains(&extension.as_str()) {
+            let list = known.join(", ");
+            return Err(Failure::input(
+                path,
+                format!("no writer of nets for the extension `{extension}`; use one of {list}"),
+            ));
+        }
+    }
+    Ok(())
+}
+
+/// The bytes of one output file.
+pub(crate) fn encode(
+    path: &Path,
+    surface: &HyperbolicNet,
+    unit: &LengthUnit,
+    wire_positions: usize,
+) -> Result<Vec<u8>, Failure> {
+    let model = |mesh: Mesh| Model::of_mesh(mesh, unit.clone());
+    let write =
+        |model: &Model| exchange::encode_model(path, model).map_err(|e| Failure::input(path, e));
+    match exchange::extension_of(path).as_str() {
+        "ron" => exchange::write_net(&net_file(surface, unit))
+            .map(String::into_bytes)
+            .map_err(Failure::other),
+        "step" | "stp" => {
+            let mut surfaces = Vec::with_capacity(surface.shape().len());
+            for (face, patch) in surface.patches().map_err(Failure::other)?.iter().enumerate() {
+                let surface = patch.to_surface().map_err(Failure::other)?;
+                surfaces.push(NamedSurface { name: format!("panel {face}"), surface });
+            }
+            write(&Model { unit: unit.clone(), surfaces, ..Model::default() })
+        }
+        "glb" => {
+            let sampled = SampledPatches::new(surface, PICTURE_CELLS, PatchJet::sample)
+                .map_err(Failure::other)?;
+            write(&model(sampled_mesh("hyperbolic net", &sampled)))
+        }
+        "csv" | "dxf" => {
+            let cuts =
+                hyperbolic_nets::wire_cuts(surface, wire_positions).map_err(Failure::other)?;
+            let segments: Vec<Segment> = cuts
+                .iter()
+                .map(|c| Segment {
+                    labels: vec![c.face as u64, u64::from(c.family), c.index as u64],
+                    ends: c.ends,
+                })
+                .collect();
+            Ok(if exchange::extension_of(path) == "csv" {
+                exchange::write_segments_csv(&["panel", "family", "position"], &segments)
+            } else {
+                exchange::write_segments_dxf("PANEL", &segments)
+            }
+            .into_bytes())
+        }
+        _ => write(&model(Mesh::from_poly_mesh(surface.net().mesh()))),
+    }
+}
+
+/// Cells of a patch in pictures and meshes.
+pub(crate) const PICTURE_CELLS: usize = 6;
+
+fn net_file(surface: &HyperbolicNet, unit: &LengthUnit) -> Net {
+    Net {
+        unit: unit.clone(),
+        vertices: surface.net().positions().to_vec(),
+        quads: surface.net().quads().to_vec(),
+        normals: surface.normals().map(<[DVec3]>::to_vec).unwrap_or_default(),
+        shape_parameters: surface.shape().to_vec(),
+    }
+}
+
+/// A mesh with exact normals and curvatures.
+pub(crate) fn sampled_mesh(name: &str, sampled: &SampledPatches) -> Mesh {
+    let field = |name: &str, value: fn(&hyperbolic_nets::SurfaceSample) -> f64| Field {
+        name: name.to_owned(),
+        values: sampled.samples.iter().map(value).collect(),
+    };
+    Mesh {
+        name: name.to_owned(),
+        positions: sampled.samples.iter().map(|s| s.point).collect(),
+        normals: sampled.samples.iter().map(|s| s.normal).collect(),
+        faces: sampled.quads().into_iter().collect(),
+        vertex_fields: vec![field("H", |s| s.mean_curvature), field("K", |s| s.gaussian_curvature)],
+        ..Mesh::default()
+    }
+}
+
+/// The status of a solver as a command reports it.
+pub(crate) fn status(status: gp_solver::Status) -> Status {
+    match status {
+        gp_solver::Status::Converged => Status::Converged,
+        gp_solver::Status::Stalled => Status::Stalled,
+        gp_solver::Status::IterationLimit => Status::IterationLimit,
+        gp_solver::Status::Interrupted => Status::Interrupted,
+        gp_solver::Status::Infeasible => Status::Infeasible,
+    }
+}
