@@ -57,7 +57,12 @@ pub(crate) fn read_mesh(path: &Path) -> Result<(PolyMesh, LengthUnit, Vec<String
 
 /// Refuses outputs that could not be written at the end.
 pub(crate) fn check_outputs(outputs: &[PathBuf], known: &[&str]) -> Result<(), Failure> {
-    for path in outputs {
+    for (k, path) in outputs.iter().enumerate() {
+        if outputs[..k].contains(path) {
+            let message = format!("{}: named twice as an output; drop one", path.display());
+            return Err(Failure::usage(message));
+        }
+        crate::args::check_output_path(path)?;
         let extension = exchange::extension_of(path);
         if !known.contains(&extension.as_str()) {
             let list = known.join(", ");

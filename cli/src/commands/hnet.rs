@@ -18,7 +18,7 @@ use std::path::PathBuf;
 /// Arguments of `hnet`.
 #[derive(Debug, clap::Args)]
 #[command(
-    after_help = "Example: umbilic hnet fixtures/catenoid-ring.obj -o ring.step -o ring.glb -o ring.ron --metrics ring.json\n\nOutputs: ron (net file), step (exact rational patches), obj (the quads), glb (sampled, with curvatures), csv and dxf (wire positions for cutting molds)."
+    after_help = "Example: umbilic hnet fixtures/nets/catenoid-ring.obj -o ring.step -o ring.glb -o ring.ron --metrics ring.json\n\nOutputs: ron (net file), step (exact rational patches), obj (the quads), glb (sampled, with curvatures), csv and dxf (wire positions for cutting molds)."
 )]
 pub(crate) struct Hnet {
     /// Quads that follow the asymptotic directions of a negatively curved surface, or a net file
@@ -125,7 +125,6 @@ const SAME_SHAPE: f64 = 1e-3;
 
 impl Hnet {
     pub(crate) fn run(self, context: &Context) -> Result<Outcome, Failure> {
-        self.output.check()?;
         if let Some(path) = &self.report {
             crate::args::check_output_path(path)?;
         }

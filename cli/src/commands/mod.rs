@@ -8,6 +8,7 @@
 mod analyze;
 mod asymptotic;
 mod convert;
+mod darboux;
 mod demo;
 mod fit;
 mod hnet;
@@ -50,6 +51,8 @@ commands! {
     asymptotic::Asymptotic,
     /// Change the format of surfaces, meshes, curves and points
     convert::Convert,
+    /// Transform a hyperbolic net into a smooth surface of Darboux cyclide patches
+    darboux::Darboux,
     /// Run the main job with no input: a built-in roof becomes a Weingarten surface
     demo::Demo,
     /// Fit a B-spline surface to a quad mesh or a grid of points

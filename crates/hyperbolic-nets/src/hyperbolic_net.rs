@@ -183,10 +183,20 @@ pub(crate) fn smallest_eigenvector(mut a: [[f64; 3]; 3]) -> DVec3 {
     vectors[smallest]
 }
 
-/// Distances of all vertices from a surface, in model units.
+/// Distances of all vertices from the tangent plane of a surface at their feet, in model units.
+///
+/// Where the foot is inside the surface this is the distance from it. A vertex beyond the border
+/// of an open surface is measured against the plane in which the surface would go on, so that
+/// sliding along the surface does not count.
 #[must_use]
 pub fn distances(positions: &[DVec3], reference: &dyn ClosestPoint) -> Vec<f64> {
-    positions.par_iter().map(|p| reference.closest_point(*p).point.distance(*p)).collect()
+    positions
+        .par_iter()
+        .map(|p| {
+            let foot = reference.closest_point(*p);
+            (*p - foot.point).dot(foot.normal).abs()
+        })
+        .collect()
 }
 
 #[cfg(test)]

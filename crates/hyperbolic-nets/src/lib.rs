@@ -3,6 +3,7 @@
 mod asymptotic_field;
 mod blocks;
 mod boundary;
+mod cage;
 mod darboux;
 mod descend;
 mod error;
@@ -20,9 +21,11 @@ mod quad_distance;
 mod sample;
 mod shape;
 mod small;
+mod transformed;
 
 pub use asymptotic_field::AsymptoticField;
 pub use boundary::Boundary;
+pub use cage::{CageFit, Freedom, cage_corners, fit_cage};
 pub use darboux::{Branch, Cyclide, DarbouxError, DarbouxMap, ImageCircle};
 pub use descend::StepRecord;
 pub use error::{NetError, PatchError};
@@ -37,3 +40,4 @@ pub use patch::{BilinearPatch, PatchJet, Quadric};
 pub use published::{FairnessOrder, PublishedOptions, StarPlanarity, solve_published};
 pub use sample::{SampledPatches, SurfaceSample};
 pub use shape::{ShapeFit, Spread, best_log_factor, fit_shape_parameters};
+pub use transformed::{CAGE_EDGES, TransformedNet, image_of_segment};

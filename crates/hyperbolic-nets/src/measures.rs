@@ -14,7 +14,8 @@ pub struct NetMeasures {
     pub kinks: KinkStatistics,
     /// Least and largest `W` of the diagonals 0–2.
     pub shape_range: [f64; 2],
-    /// Mean and largest distance of the vertices from the reference, in model units.
+    /// Mean and largest distance of the vertices from the reference (see [`crate::distances`]), in
+    /// model units.
     pub deviation: [f64; 2],
     /// Diagonal of the reference's bounding box, in model units.
     pub diagonal: f64,
