@@ -44,8 +44,9 @@ pub fn cage_corners(bounds: BoundingBox, margin: f64) -> [DVec3; 8] {
 ///
 /// Every pair `x → y` gives three linear equations `x_i (N Y)₄ = (N Y)_i` for the entries of `N`;
 /// the smallest singular vector solves them (direct linear transformation). For 16 degrees of
-/// freedom this is done for fixed `c`, and `c` is searched. Where the corners leave freedom (an
-/// unmoved box does) the map nearest to a projective one is taken.
+/// freedom this is done for fixed `c`, and `c ≥ 0` is searched (`−c` differs by a scaling). Where
+/// no map takes all corners exactly, or several do, a map near the identity is taken that meets
+/// them approximately: [`CageFit::errors`] says how well.
 ///
 /// # Errors
 /// [`DarbouxError::BadCage`] if the corners span no volume, have no common transformation, or
@@ -108,23 +109,29 @@ fn general(pairs: &[(DVec3, DVec3)]) -> [[f64; 5]; 4] {
     let lifted: Vec<(DVec3, Vec<f64>)> =
         pairs.iter().map(|&(x, y)| (x, vec![y.x, y.y, y.z, y.length_squared(), 1.0])).collect();
     let all = right_singular_vectors(&equations(&lifted));
-    let null: Vec<&Vec<f64>> =
-        all.iter().filter(|(s, _)| *s <= NULL_RATIO * all[0].0).map(|(_, v)| v).collect();
-    let best = if null.len() > 1 {
-        // Among all solutions the one with the least share of |y|²: combine the null vectors so
-        // that their fourth column is smallest.
-        let rows: Vec<Vec<f64>> =
-            (0..4).map(|i| null.iter().map(|v| v[5 * i + 3]).collect()).collect();
-        let mix = right_singular_vectors(&rows).pop().map(|(_, v)| v).unwrap_or_default();
-        (0..20).map(|k| mix.iter().zip(&null).map(|(m, v)| m * v[k]).sum()).collect()
-    } else {
+    let largest = all[0].0;
+    let null = all.iter().filter(|(s, _)| *s <= NULL_RATIO * largest).count();
+    let best: Vec<f64> = if null == 1 {
         all[all.len() - 1].1.clone()
+    } else {
+        // The corners of a box lie on a sphere, whose equation maps them all to nothing: cages near
+        // a box have such false solutions with small residuals. The identity with its components
+        // of large residual damped away is the regularised solution without them.
+        let mut best = vec![0.0; 20];
+        for (s, v) in &all {
+            let identity = v[0] + v[6] + v[12] + v[19];
+            let share = identity / (1.0 + (s / (DAMPING * largest)).powi(2));
+            best.iter_mut().zip(v).for_each(|(b, x)| *b += share * x);
+        }
+        best
     };
     std::array::from_fn(|i| std::array::from_fn(|k| best[5 * i + k]))
 }
 
 /// Singular values below this share of the largest count as zero.
 const NULL_RATIO: f64 = 1e-10;
+/// Singular values far below this share of the largest are left alone by the damping.
+const DAMPING: f64 = 1e-2;
 
 /// Residual and matrix of the best projective map before the transformation with centre `c`.
 fn with_centre(pairs: &[(DVec3, DVec3)], c: f64) -> (f64, [[f64; 5]; 4]) {
@@ -183,7 +190,8 @@ fn best_centre(pairs: &[(DVec3, DVec3)]) -> f64 {
             best = (value, c);
         }
     }
-    best.1
+    // Only c² is determined: the sign is a scaling of the model.
+    best.1.abs()
 }
 
 #[cfg(test)]
@@ -261,7 +269,7 @@ mod tests {
             let map = DarbouxMap::from_matrix(n).unwrap().in_frame(centre, unit).unwrap();
             let images = images(&map);
             let fit = fit_cage(&corners(), &images, Freedom::Sixteen).unwrap();
-            assert!((fit.c.unwrap() - c).abs() < 1e-6, "{:?} for {c}", fit.c);
+            assert!((fit.c.unwrap() - c.abs()).abs() < 1e-6, "{:?} for {c}", fit.c);
             assert!(fit.errors.iter().all(|e| *e < 1e-8 * unit), "c = {c}: {:?}", fit.errors);
         }
     }

@@ -199,11 +199,16 @@ impl DarbouxMap {
     pub fn through(mut self, pairs: &[(DVec3, DVec3)]) -> Result<Self, DarbouxError> {
         let mut votes = [Vec::new(), Vec::new()];
         for (k, &(x, y)) in pairs.iter().enumerate() {
+            // A branch without an image here is no candidate.
             let far = |sign: f64| {
-                let lifted = self.lift(x, sign)?;
-                Ok::<f64, DarbouxError>(project(&lifted).map_or(f64::INFINITY, |p| p.distance(y)))
+                let image = self.lift(x, sign).ok().and_then(|lifted| project(&lifted));
+                image.map_or(f64::INFINITY, |p| p.distance(y))
             };
-            let (plus, minus) = (far(1.0)?, far(-1.0)?);
+            let (plus, minus) = (far(1.0), far(-1.0));
+            if plus.min(minus) == f64::INFINITY {
+                let why = format!("corner {k} has no real image");
+                return Err(DarbouxError::BadCage { why });
+            }
             votes[usize::from(minus < plus)].push(k);
         }
         if let ([a, ..], [b, ..]) = (votes[0].as_slice(), votes[1].as_slice()) {
