@@ -1,4 +1,5 @@
 //! A torus with exact normals and curvatures, as a view and in a report.
+#![allow(dead_code, reason = "each user takes what it needs")]
 
 use std::f64::consts::TAU;
 
