@@ -85,6 +85,7 @@ pub(crate) struct Settings {
     parallel: Option<f64>,
     /// Move a control point first (indices from 0; repeatable)
     #[arg(long = "move", value_name = "I,J,DX,DY,DZ", allow_hyphen_values = true)]
+    #[serde(rename = "move")]
     moves: Option<Vec<MoveText>>,
 }
 

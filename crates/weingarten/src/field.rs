@@ -5,7 +5,7 @@ use pulp::Simd;
 use rayon::prelude::*;
 
 use crate::grid::{LaneKernel, SampleGrid, Scratch, store};
-use crate::kernel::{CurvatureJet, FOURTH, Field, THIRD, curvature_jet, parallel_jet};
+use crate::kernel::{CurvatureJet, FIRST, FOURTH, Field, THIRD, curvature_jet, parallel_jet};
 use crate::real::{Lanes, Triple};
 
 /// What the surface is like at one sample.
@@ -103,6 +103,28 @@ pub(crate) fn samples(grid: &SampleGrid, x: &[f64]) -> Vec<Sample> {
         (0..grid.v.len()).map(at)
     };
     (0..grid.u.len()).into_par_iter().with_min_len(4).flat_map_iter(row).collect()
+}
+
+struct DeltaKernel<'a> {
+    out: &'a mut [f64],
+}
+
+impl LaneKernel<FIRST> for DeltaKernel<'_> {
+    #[inline(always)]
+    fn run<S: Simd>(&mut self, simd: S, at: usize, d: &[Triple<Lanes<S>>; FIRST]) {
+        let normal = d[1].cross(d[2]);
+        store(simd, self.out, at, normal.dot(normal));
+    }
+}
+
+/// The determinant `Δ` of the first fundamental form at every sample, rows of samples padded to
+/// the stride of the grid.
+pub(crate) fn determinants_into(grid: &SampleGrid, x: &[f64], out: &mut [f64]) {
+    let unrolled = grid.unroll(x);
+    let mut scratch = Scratch::default();
+    for (i, out) in out.chunks_exact_mut(grid.stride()).enumerate() {
+        grid.sweep(i, &unrolled, &mut scratch, &mut DeltaKernel { out });
+    }
 }
 
 struct ParallelScale<'a> {

@@ -7,6 +7,8 @@
 
 use crate::real::{Dual, Real, Triple, dual, slope};
 
+/// Number of derivative vectors up to first order, the position included.
+pub(crate) const FIRST: usize = 3;
 /// Number of derivative vectors up to second order, the position included.
 pub(crate) const SECOND: usize = 6;
 /// Number of derivative vectors up to third order, the position included.

@@ -6,7 +6,7 @@ use gp_solver::{Elements, ResidualBlock};
 use pulp::Simd;
 
 use super::rows::{SampleTerm, fill};
-use crate::field::{Sample, samples};
+use crate::field::{Sample, determinants_into};
 use crate::grid::{LaneKernel, SampleGrid, Scratch, load, store};
 use crate::kernel::{THIRD, alignment, curvature_jet};
 use crate::real::{Lanes, Triple};
@@ -154,13 +154,10 @@ impl ResidualBlock for Alignment {
     }
 
     fn refresh(&mut self, x: &[f64]) {
-        let now = samples(&self.grid, x);
-        let stride = self.grid.stride();
-        let m_v = self.grid.v.len();
-        for (s, sample) in now.iter().enumerate() {
-            // A degenerate trial never gets here; a NaN would be named by the solver.
-            let root = sample.delta().sqrt();
-            self.factors[s / m_v * stride + s % m_v] = self.weight / (root * self.q0);
+        determinants_into(&self.grid, x, &mut self.factors);
+        for factor in &mut self.factors {
+            // A zero here becomes an infinite residual, which the solver names.
+            *factor = self.weight / (factor.sqrt() * self.q0);
         }
     }
 
