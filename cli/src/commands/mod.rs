@@ -10,6 +10,7 @@ mod asymptotic;
 mod convert;
 mod darboux;
 mod demo;
+mod fair;
 mod fit;
 mod hnet;
 mod weingarten;
@@ -57,6 +58,8 @@ commands! {
     demo::Demo,
     /// Fit a B-spline surface to a quad mesh or a grid of points
     fit::Fit,
+    /// Minimise a curvature functional of a subdivision surface
+    fair::Fair,
     /// Optimise a B-spline surface towards a Weingarten surface
     weingarten::Weingarten,
     /// Turn quads along asymptotic directions into a smooth skin of ruled patches

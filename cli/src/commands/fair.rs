@@ -1,0 +1,441 @@
+//! `umbilic fair QUADS -o OUT`.
+
+use crate::args::{ConfigArgs, ConvergedArgs, OutputArgs, ReportArgs};
+use crate::context::Context;
+use crate::failure::Failure;
+use crate::layered;
+use crate::outcome::{Outcome, Status};
+use crate::report_support;
+use bspline::{BsplineSurface, Degree, KnotVector};
+use curvature_variation::{
+    Constraints, Energy, FairOptions, FairReport, Fairing, Functional, Method, Quadrature,
+    SurfaceSamples, SymmetryMode, fair,
+};
+use exchange::{Field, LengthUnit, Mesh, Model, NamedSurface};
+use geom_core::{DVec3, UmbilicKind};
+use report::{EnergyHistory, FieldScale, LineRole, LineSet, ScalarField, Series, SurfaceView};
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
+use std::ops::ControlFlow;
+use std::path::{Path, PathBuf};
+use subdiv_catmull_clark::{Blend, Creases, SubdivisionSurface};
+
+/// Arguments of `fair`.
+#[derive(Debug, clap::Args)]
+#[command(after_help = "\
+Examples:
+  umbilic fair fixtures/quads/theta.obj -o fair.obj -o fair.glb --levels 1
+  umbilic fair fixtures/quads/theta.obj -o fair.obj --energy \"0.92*bending + 0.08*mehlum_tarrou\"
+Functionals: area, mean_curvature, gaussian, bending, willmore, umbilic_deviation, mvs, mvs_cross,
+f1, f3, mehlum_tarrou, mehlum_tarrou(w1,w3), cross_curvature, average_derivative, sqrt.")]
+pub(crate) struct Fair {
+    /// Control mesh of quads or n-gons; the surface is its Catmull-Clark limit
+    input: PathBuf,
+    #[command(flatten)]
+    output: OutputArgs,
+    #[command(flatten)]
+    settings: Settings,
+    #[command(flatten)]
+    config: ConfigArgs,
+    #[command(flatten)]
+    converged: ConvergedArgs,
+    #[command(flatten)]
+    report: ReportArgs,
+}
+
+/// Options of the method, from flags or the configuration file.
+#[derive(Debug, Default, clap::Args, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+struct Settings {
+    /// What to minimise, a sum such as 0.92*bending + 0.08*mehlum_tarrou [default: mehlum_tarrou]
+    #[arg(long, value_name = "EXPR", allow_hyphen_values = true)]
+    energy: Option<String>,
+    /// Refinements, each followed by a minimisation [default: 2]
+    #[arg(long, value_name = "N")]
+    levels: Option<usize>,
+    /// Steps per level at most [default: 400]
+    #[arg(long, value_name = "N")]
+    iterations: Option<usize>,
+    /// How to descend [default: lagged-gauss-newton]
+    #[arg(long, value_enum)]
+    method: Option<MethodName>,
+    /// Surface at extraordinary vertices: free curvature, or the published flat spot
+    /// [default: smooth]
+    #[arg(long, value_enum)]
+    blend: Option<BlendName>,
+    /// Keep the boundary and the two rings next to it
+    #[arg(long, num_args = 0, default_missing_value = "true")]
+    clamp_boundary: Option<bool>,
+    /// Fixed vertices, pinned limit points and tangent planes
+    #[arg(long, value_name = "FILE.ron")]
+    fix: Option<PathBuf>,
+    /// Symmetries to keep: auto, none, or a RON file with matrices [default: auto]
+    #[arg(long, value_name = "auto|none|FILE.ron")]
+    symmetry: Option<String>,
+}
+
+layered!(Settings { energy, levels, iterations, method, blend, clamp_boundary, fix, symmetry });
+
+#[derive(Clone, Copy, Debug, clap::ValueEnum, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+enum MethodName {
+    LaggedGaussNewton,
+    GaussNewton,
+    Sobolev,
+    Lbfgs,
+}
+
+#[derive(Clone, Copy, Debug, clap::ValueEnum, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+enum BlendName {
+    Smooth,
+    Flat,
+}
+
+impl Fair {
+    pub(crate) fn run(self, context: &Context) -> Result<Outcome, Failure> {
+        self.output.check()?;
+        self.report.check()?;
+        let (options, constraints) = self.settings.over(self.config.load()?).resolve()?;
+        let model =
+            exchange::read_model(&self.input).map_err(|e| Failure::input(&self.input, e))?;
+        let mesh = read_control_mesh(&self.input, &model)?;
+        let bar = context.progress("fairing", (options.levels + 1) * options.iterations);
+        let result = fair(&mesh, &Creases::none(), &constraints, &options, |p| {
+            let done = p.level * options.iterations + p.iteration;
+            bar.at(done, format!("{} vertices, energy {:.4}", p.vertices, p.energy));
+            if context.interrupted() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+        })
+        .map_err(|e| Failure::input(&self.input, e))?;
+        drop(bar);
+        let mut outcome = Outcome::new(status(result.report.status), result.report.iterations)
+            .with_input(&self.input)
+            .with_metrics(&MetricsObject::new(&result))?;
+        outcome.summary = summary(&result, &options);
+        outcome.warnings.clone_from(&model.warnings);
+        if result.report.quadrature_gap > 0.01 {
+            outcome.warnings.push(format!(
+                "the energy changes by {:.1} % with a finer quadrature; add a level",
+                100.0 * result.report.quadrature_gap
+            ));
+        }
+        outcome.require_converged = self.converged.require_converged;
+        for path in self.output.output {
+            let content = content_for(&path, &result, &model.unit, &mut outcome.warnings)?;
+            let bytes =
+                exchange::encode_model(&path, &content).map_err(|e| Failure::input(&path, e))?;
+            outcome.files.push((path, bytes));
+        }
+        if self.report.wanted() {
+            let mut page = report_support::new("Fairing of a subdivision surface");
+            fill_report(&mut page, &result, &options, &model.unit)?;
+            report_support::add_files(&mut outcome, &self.report, context, page)?;
+        }
+        Ok(outcome)
+    }
+}
+
+impl Settings {
+    fn resolve(self) -> Result<(FairOptions, Constraints), Failure> {
+        let defaults = FairOptions::default();
+        let energy = match &self.energy {
+            Some(text) => text.parse::<Energy>().map_err(Failure::usage)?,
+            None => defaults.energy,
+        };
+        let symmetry = match self.symmetry.as_deref() {
+            None | Some("auto") => SymmetryMode::Auto,
+            Some("none") => SymmetryMode::None,
+            Some(file) => {
+                let path = Path::new(file);
+                let declared: SymmetryFile =
+                    exchange::read_ron(path).map_err(|e| Failure::input(path, e))?;
+                SymmetryMode::Declared(declared.matrices)
+            }
+        };
+        let mut constraints = match &self.fix {
+            Some(path) => exchange::read_ron(path).map_err(|e| Failure::input(path, e))?,
+            None => Constraints::default(),
+        };
+        constraints.clamp_boundary |= self.clamp_boundary.unwrap_or(false);
+        let options = FairOptions {
+            energy,
+            levels: self.levels.unwrap_or(defaults.levels),
+            iterations: self.iterations.unwrap_or(defaults.iterations),
+            method: self.method.map_or(defaults.method, |m| match m {
+                MethodName::LaggedGaussNewton => Method::LaggedGaussNewton,
+                MethodName::GaussNewton => Method::GaussNewton,
+                MethodName::Sobolev => Method::Sobolev,
+                MethodName::Lbfgs => Method::Lbfgs,
+            }),
+            blend: self.blend.map_or(defaults.blend, |b| match b {
+                BlendName::Smooth => Blend::Smooth,
+                BlendName::Flat => Blend::Flat,
+            }),
+            quadrature: Quadrature::NORMAL,
+            symmetry,
+            ..defaults
+        };
+        Ok((options, constraints))
+    }
+}
+
+/// `--symmetry FILE.ron`.
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct SymmetryFile {
+    /// Rotations and reflections about the mesh's centre, row by row.
+    matrices: Vec<[[f64; 3]; 3]>,
+}
+
+fn read_control_mesh(path: &Path, model: &Model) -> Result<geom_core::PolyMesh, Failure> {
+    let mut meshes = model.meshes.iter().filter(|m| !m.faces.is_empty());
+    match (meshes.next(), meshes.next()) {
+        (Some(mesh), None) => mesh.to_poly_mesh().map_err(|e| Failure::input(path, e)),
+        (None, _) => Err(Failure::input(path, "there is no mesh in this file; give a quad mesh")),
+        (Some(_), Some(_)) => {
+            Err(Failure::input(path, "there are several meshes in this file; leave one of them in"))
+        }
+    }
+}
+
+fn status(status: gp_solver::Status) -> Status {
+    match status {
+        gp_solver::Status::Converged => Status::Converged,
+        gp_solver::Status::Stalled => Status::Stalled,
+        gp_solver::Status::IterationLimit => Status::IterationLimit,
+        gp_solver::Status::Interrupted => Status::Interrupted,
+        gp_solver::Status::Infeasible => Status::Infeasible,
+    }
+}
+
+/// The `metrics` object.
+#[derive(Serialize)]
+struct MetricsObject {
+    energies: BTreeMap<&'static str, f64>,
+    quadrature_gap: f64,
+    gauss_bonnet_residual: Option<f64>,
+    energy_initial: f64,
+    energy_final: f64,
+    gradient_norm: f64,
+    vertices: usize,
+    patches: usize,
+    ms_per_gradient: f64,
+    peak_memory_mb: Option<f64>,
+}
+
+impl MetricsObject {
+    fn new(result: &Fairing) -> Self {
+        let FairReport { after, quadrature_gap, energy_initial, energy_final, .. } = &result.report;
+        let residual = result.report.gauss_bonnet_residual;
+        Self {
+            energies: after.iter().map(|(f, value)| (f.name(), value)).collect(),
+            quadrature_gap: *quadrature_gap,
+            gauss_bonnet_residual: residual.is_finite().then_some(residual),
+            energy_initial: *energy_initial,
+            energy_final: *energy_final,
+            gradient_norm: result.report.gradient_norm,
+            vertices: result.mesh.vertex_count(),
+            patches: result.mesh.face_count(),
+            ms_per_gradient: 1e3 * result.report.seconds_per_gradient,
+            peak_memory_mb: peak_memory_mb(),
+        }
+    }
+}
+
+/// Peak resident memory of this process, where the system tells.
+fn peak_memory_mb() -> Option<f64> {
+    let status = std::fs::read_to_string("/proc/self/status").ok()?;
+    let line = status.lines().find(|line| line.starts_with("VmHWM:"))?;
+    let kilobytes: f64 = line.split_whitespace().nth(1)?.parse().ok()?;
+    Some(kilobytes / 1024.0)
+}
+
+fn summary(result: &Fairing, options: &FairOptions) -> Vec<String> {
+    let report = &result.report;
+    let mut lines = vec![format!(
+        "{} vertices, {} patches, {} steps",
+        result.mesh.vertex_count(),
+        result.mesh.face_count(),
+        report.iterations
+    )];
+    for level in &report.levels {
+        lines.push(format!(
+            "  {:6} vertices        {:.4} to {:.4} in {} steps, {} symmetries, {:.2} s",
+            level.vertices,
+            level.initial_energy,
+            level.final_energy,
+            level.iterations,
+            level.symmetries,
+            level.seconds
+        ));
+    }
+    lines.push(format!(
+        "  {}  {:.4} (before {:.4}), quadrature gap {:.1e}",
+        options.energy, report.energy_final, report.energy_initial, report.quadrature_gap
+    ));
+    if let Some(limit) = report.extrapolated {
+        lines.push(format!("  extrapolated to vanishing mesh size {limit:.4}"));
+    }
+    let value = |f: Functional| report.after.get(f);
+    lines.push(format!(
+        "  bending {:.4}, Willmore {:.4}, SI-Mehlum-Tarrou {:.4}, SI-F1 {:.4}, SI-F3 {:.4}",
+        value(Functional::Bending),
+        value(Functional::Willmore),
+        value(Functional::MehlumTarrou { w1: 1.0, w3: 1.0 }),
+        value(Functional::F1),
+        value(Functional::F3)
+    ));
+    let (mvs, cross) = (value(Functional::Mvs), value(Functional::MvsCross));
+    lines.push(format!(
+        "  SI-MVS {mvs:.4}, SI-MVScross {cross:.4} (with the half of Joshi 2008, Fig. 8.4: {:.4}, {:.4})",
+        0.5 * mvs,
+        0.5 * cross
+    ));
+    if report.gauss_bonnet_residual.is_finite() {
+        lines.push(format!("  Gauss-Bonnet residual {:.1e}", report.gauss_bonnet_residual));
+    }
+    lines
+}
+
+/// Control mesh, sampled surface or spline patches, as the format asks for.
+fn content_for(
+    path: &Path,
+    result: &Fairing,
+    unit: &LengthUnit,
+    warnings: &mut Vec<String>,
+) -> Result<Model, Failure> {
+    match exchange::extension_of(path).as_str() {
+        "step" | "stp" | "ron" => {
+            let (surfaces, left_out) = spline_patches(result)?;
+            if left_out > 0 {
+                warnings.push(format!(
+                    "{}: {left_out} patches at extraordinary vertices are not bi-cubic and are left out",
+                    path.display()
+                ));
+            }
+            Ok(Model { unit: unit.clone(), surfaces, ..Model::default() })
+        }
+        "glb" | "gltf" => {
+            let samples = samples_of(&result.mesh, &result.surface);
+            let mut mesh = Mesh::new(samples.positions, samples.triangles);
+            mesh.normals = samples.normals;
+            let field = |name: &str, values| Field { name: name.to_owned(), values };
+            mesh.vertex_fields = vec![
+                field("H", samples.mean_curvature),
+                field("K", samples.gaussian_curvature),
+                field("K1", samples.k1),
+                field("K2", samples.k2),
+            ];
+            Ok(Model::of_mesh(mesh, unit.clone()))
+        }
+        _ => Ok(Model::of_mesh(Mesh::from_poly_mesh(&result.mesh), unit.clone())),
+    }
+}
+
+fn samples_of(mesh: &geom_core::PolyMesh, surface: &SubdivisionSurface) -> SurfaceSamples {
+    let side = report_support::jets::JetGrid::side_for(mesh.face_count()).min(12);
+    SurfaceSamples::new(mesh, surface, side)
+}
+
+fn spline_patches(result: &Fairing) -> Result<(Vec<NamedSurface>, usize), Failure> {
+    let degree = Degree::new(3).map_err(Failure::other)?;
+    let knots = KnotVector::clamped_uniform(degree, 4).map_err(Failure::other)?;
+    let mut surfaces = Vec::new();
+    let mut left_out = 0;
+    for patch in result.surface.patches() {
+        let Some(points) = result.surface.bezier(result.mesh.positions(), patch) else {
+            left_out += 1;
+            continue;
+        };
+        let points: Vec<DVec3> = points.into_iter().flatten().collect();
+        let surface = BsplineSurface::new(knots.clone(), knots.clone(), points, None)
+            .map_err(Failure::other)?;
+        surfaces.push(NamedSurface { name: format!("patch {}", patch.face.0), surface });
+    }
+    Ok((surfaces, left_out))
+}
+
+fn fill_report(
+    page: &mut report::Report,
+    result: &Fairing,
+    options: &FairOptions,
+    unit: &LengthUnit,
+) -> Result<(), Failure> {
+    page.length_unit = unit.to_string();
+    page.option("energy", &options.energy);
+    page.option("levels", options.levels);
+    page.option("iterations per level", options.iterations);
+    let creases = Creases::none();
+    if let Ok(before) = SubdivisionSurface::new(&result.initial, &creases, options.blend) {
+        page.stages.push(view("before", &samples_of(&result.initial, &before), &page.length_unit)?);
+    }
+    let samples = samples_of(&result.mesh, &result.surface);
+    let count = |kind| samples.umbilics.iter().filter(|u| u.kind == kind).count();
+    page.option(
+        "umbilics of the result",
+        format!(
+            "{} lemons, {} monstars, {} stars",
+            count(UmbilicKind::Lemon),
+            count(UmbilicKind::Monstar),
+            count(UmbilicKind::Star)
+        ),
+    );
+    page.stages.push(view("after", &samples, &page.length_unit)?);
+    let mut history = EnergyHistory::default();
+    let mut values = Vec::new();
+    for level in &result.report.levels {
+        history.marks.push((values.len(), format!("{} vertices", level.vertices)));
+        values.extend_from_slice(&level.history);
+    }
+    history.terms.push(Series { name: options.energy.to_string(), values });
+    page.energies = Some(history);
+    Ok(())
+}
+
+fn view(name: &str, samples: &SurfaceSamples, unit: &str) -> Result<SurfaceView, Failure> {
+    let drawn = |error| Failure::other(format!("cannot draw the result: {error}"));
+    let variation = ScalarField {
+        id: "variation".to_owned(),
+        label: "curvature variation |κn'|".to_owned(),
+        unit: format!("1/{unit}²"),
+        scale: FieldScale::Magnitude,
+        range: None,
+        values: samples.curvature_variation.clone(),
+    };
+    let mut view = SurfaceView::new(
+        name,
+        samples.positions.clone(),
+        samples.normals.clone(),
+        samples.triangles.clone(),
+    )
+    .and_then(|v| v.with_field(ScalarField::mean_curvature(samples.mean_curvature.clone(), unit)))
+    .and_then(|v| {
+        v.with_field(ScalarField::gaussian_curvature(samples.gaussian_curvature.clone(), unit))
+    })
+    .and_then(|v| v.with_field(ScalarField::kappa1(samples.k1.clone(), unit)))
+    .and_then(|v| v.with_field(ScalarField::kappa2(samples.k2.clone(), unit)))
+    .and_then(|v| v.with_field(variation))
+    .map_err(drawn)?;
+    let strokes = |lines: &[[DVec3; 2]]| lines.iter().map(|l| l.to_vec()).collect::<Vec<_>>();
+    let size = samples.positions.iter().fold(0.0_f64, |s, p| s.max(p.length()));
+    let marks = |kind| -> Vec<Vec<DVec3>> {
+        let at = samples.umbilics.iter().filter(|u| u.kind == kind);
+        at.flat_map(|u| {
+            [DVec3::X, DVec3::Y, DVec3::Z]
+                .map(|axis| vec![u.position - 0.02 * size * axis, u.position + 0.02 * size * axis])
+        })
+        .collect()
+    };
+    for (id, label, role, lines) in [
+        ("f1", "first harmonic F1", LineRole::Directions, strokes(&samples.f1_strokes)),
+        ("f3", "third harmonic F3", LineRole::Directions, strokes(&samples.f3_strokes)),
+        ("lemons", "umbilics: lemons", LineRole::Curves, marks(UmbilicKind::Lemon)),
+        ("monstars", "umbilics: monstars", LineRole::Curves, marks(UmbilicKind::Monstar)),
+        ("stars", "umbilics: stars", LineRole::Curves, marks(UmbilicKind::Star)),
+    ] {
+        if !lines.is_empty() {
+            view = view.with_lines(LineSet::new(id, label, role, lines)).map_err(drawn)?;
+        }
+    }
+    Ok(view)
+}
