@@ -1,58 +1,82 @@
 //! How Levenberg-Marquardt's damping follows success and failure.
 
+use crate::least_squares::{StepModel, System};
+
 /// Rule by which the damping `μ` changes from step to step; `ϱ` is the actual over the predicted
 /// decrease of a step.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum DampingRule {
-    /// After success `μ ← μ max(1/3, 1 − (2ϱ − 1)³)`, after the k-th refusal in a row `μ ← 2ᵏ μ`
-    /// (Nielsen 1999). Few refusals.
+    /// The damping is steered by the length of the step in the norm of `D`, the largest `diag A` so
+    /// far, as in a trust region (Moré 1978), but with one factorisation a trial: the ratio `ϱ`
+    /// gives the length wanted next (four times this one if `ϱ > 3/4`, half if `ϱ < 1/4`), and one
+    /// Newton step on the length as a function of `μ` gives the damping. The robust choice: it
+    /// follows curved valleys and finds back from far starts.
     #[default]
-    Nielsen,
-    /// After success `μ ← μ/5` if `ϱ > 1/2`, unchanged if `ϱ > 1/5`, else `5μ/2`; after a refusal
-    /// `μ ← 5μ`. Takes a third more factorisations and longer steps: worth it where a stiff term
-    /// leaves a narrow curved valley in which damping by the diagonal slows the rest down.
+    StepLength,
+    /// `D = diag A` of the iterate. After success `μ ← μ/5` if `ϱ > 1/2`, unchanged if `ϱ > 1/5`,
+    /// else `5μ/2`; after a refusal `μ ← 5μ`. For a stiff term whose diagonal changes much from
+    /// step to step, where the largest one so far would slow the rest down.
     Fivefold,
 }
 
+/// Shares of the predicted decrease below and above which the model is poor and good.
+const POOR_GAIN: f64 = 0.25;
+const GOOD_GAIN: f64 = 0.75;
+/// How far a good model lets the next step grow, and a poor one shrinks it at most and at least.
+const WIDEN: f64 = 4.0;
+const SHORTEN: (f64, f64) = (0.1, 0.5);
+/// By what factor a taken step may change the damping, and a refused one.
+const TAKEN_CHANGE: (f64, f64) = (1e-3, 10.0);
+const REFUSED_CHANGE: (f64, f64) = (1.5, 1e3);
+
 impl DampingRule {
-    /// The factor of the damping after a taken step.
-    pub(crate) fn after_success(self, gain: f64) -> f64 {
+    /// The damping after a taken step.
+    pub(crate) fn after_success(
+        self,
+        system: &mut System<'_>,
+        damping: f64,
+        model: StepModel,
+        gain: f64,
+    ) -> f64 {
         match self {
-            Self::Nielsen => (1.0 - (2.0 * gain - 1.0).powi(3)).clamp(1.0 / 3.0, 2.0),
-            Self::Fivefold if gain > 0.5 => 0.2,
-            Self::Fivefold if gain > 0.2 => 1.0,
-            Self::Fivefold => 2.5,
+            Self::StepLength => {
+                let share = if gain > GOOD_GAIN {
+                    WIDEN
+                } else if gain < POOR_GAIN {
+                    SHORTEN.1
+                } else {
+                    1.0
+                };
+                let wanted = system.damping_for_radius(damping, share * model.scaled_norm);
+                damping * (wanted / damping).clamp(TAKEN_CHANGE.0, TAKEN_CHANGE.1)
+            }
+            Self::Fivefold if gain > 0.5 => 0.2 * damping,
+            Self::Fivefold if gain > 0.2 => damping,
+            Self::Fivefold => 2.5 * damping,
         }
     }
 
-    /// The factor of the damping after the first refusal.
-    pub(crate) fn first_growth(self) -> f64 {
+    /// The damping after a refused step.
+    pub(crate) fn after_refusal(
+        self,
+        system: &mut System<'_>,
+        damping: f64,
+        model: StepModel,
+        decrease: f64,
+    ) -> f64 {
         match self {
-            Self::Nielsen => 2.0,
-            Self::Fivefold => 5.0,
-        }
-    }
-
-    /// The factor after one more refusal, from that of the last.
-    pub(crate) fn next_growth(self, growth: f64) -> f64 {
-        match self {
-            Self::Nielsen => 2.0 * growth,
-            Self::Fivefold => growth,
-        }
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_good_step_lowers_the_damping_and_a_bad_one_raises_it() {
-        for rule in [DampingRule::Nielsen, DampingRule::Fivefold] {
-            assert!(rule.after_success(1.0) < 0.4);
-            assert!(rule.after_success(0.05) > 1.4);
-            assert!(rule.next_growth(rule.first_growth()) >= rule.first_growth());
+            Self::StepLength => {
+                // Minimum of the parabola through both energies and the slope.
+                let slope = system.slope();
+                let share = 0.5 * slope / (slope + decrease);
+                let share = if share.is_finite() { share } else { SHORTEN.0 };
+                let radius = share.clamp(SHORTEN.0, SHORTEN.1) * model.scaled_norm;
+                let wanted = system.damping_for_radius(damping, radius);
+                let (least, most) = (REFUSED_CHANGE.0 * damping, REFUSED_CHANGE.1 * damping);
+                if wanted.is_finite() { wanted.clamp(least, most) } else { most }
+            }
+            Self::Fivefold => 5.0 * damping,
         }
     }
 }

@@ -7,8 +7,9 @@ use crate::error::SolverError;
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum Method {
-    /// Levenberg-Marquardt: `(A + μ D) s = −g` with `D = diag A`, steps that raise the energy are
-    /// refused, and the damping `μ` follows the ratio of actual to predicted decrease.
+    /// Levenberg-Marquardt: `(A + μ D) s = −g` with `D` the diagonal of `A` or the
+    /// largest it has been; steps that raise the energy are refused, and the damping `μ` follows
+    /// a [`DampingRule`].
     LevenbergMarquardt,
     /// Undamped guided projection (Pellis et al. 2021, Eq. 11): `(A + ε² I) s = −g`, every step
     /// taken. Nothing keeps the energy from rising.
@@ -47,7 +48,8 @@ pub struct Options {
     /// Converged if `max_i |g_i| / √(A_ii · 2E) ≤ gradient_tol`: the largest cosine of an angle
     /// between the residual and a column of the Jacobian.
     pub gradient_tol: f64,
-    /// Converged if a taken step has `‖s‖_D ≤ step_tol · ‖x‖_D`, with `D = diag A`.
+    /// Converged if a taken step has `‖s‖_D ≤ step_tol · ‖x‖_D`, with `D` the largest
+    /// `diag A` so far.
     pub step_tol: f64,
     /// Converged if both the predicted and the actual decrease of a taken step are
     /// `≤ energy_tol · E`.
@@ -62,11 +64,11 @@ impl Default for Options {
     fn default() -> Self {
         Self {
             method: Method::LevenbergMarquardt,
-            max_iterations: 200,
+            max_iterations: 1000,
             initial_damping: 1e-3,
             damping_rule: DampingRule::default(),
             gradient_tol: 1e-10,
-            step_tol: 1e-10,
+            step_tol: 1e-14,
             energy_tol: 1e-14,
             abs_energy_tol: 0.0,
             factorization: Factorization::Auto,

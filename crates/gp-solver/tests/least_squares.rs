@@ -1,8 +1,9 @@
 //! The solvers on problems with known answers.
 
 use gp_solver::{
-    Elements, EnergyBlock, Factorization, Options, Problem, QuadraticBuilder, ResidualBlock,
-    SolverError, Status, System, solve, solve_observed,
+    Checkpoint, Elements, EnergyBlock, Factorization, Iteration, Options, Problem,
+    QuadraticBuilder, ResidualBlock, SolverError, Status, System, check_gradient, check_jacobian,
+    resume_system, solve, solve_observed,
 };
 use std::ops::ControlFlow;
 
@@ -202,4 +203,151 @@ fn malformed_blocks_are_named() {
     problem.add(Faulty(elements, 0.0, 0.0));
     let error = solve(problem, &mut [0.0; 2], &Options::default()).unwrap_err();
     assert!(matches!(error, SolverError::RepeatedColumn { column: 1, .. }));
+}
+
+#[test]
+fn a_resumed_solve_ends_in_the_same_bits() {
+    let options = Options::default();
+    let mut problem = Problem::new(2);
+    problem.add(Rosenbrock::new());
+    let mut whole = [-1.2, 1.0];
+    let mut checkpoint = None;
+    let report = solve_observed(problem, &mut whole, &options, |it| {
+        if it.iteration == 5 {
+            checkpoint = Some(it.checkpoint());
+        }
+        ControlFlow::Continue(())
+    })
+    .unwrap();
+    let checkpoint = checkpoint.unwrap();
+    let mut problem = Problem::new(2);
+    problem.add(Rosenbrock::new());
+    let mut system = System::new(problem, Factorization::Auto).unwrap();
+    let mut x = [0.0; 2];
+    let go_on = |_: &Iteration<'_>| ControlFlow::Continue(());
+    let resumed = resume_system(&mut system, &checkpoint, &mut x, &options, go_on).unwrap();
+    assert_eq!(x.map(f64::to_bits), whole.map(f64::to_bits));
+    assert_eq!(resumed.iterations, report.iterations);
+    assert_eq!(resumed.final_energy.to_bits(), report.final_energy.to_bits());
+    let other = Checkpoint { x: vec![0.0; 3], ..checkpoint };
+    let error = resume_system(&mut system, &other, &mut x, &options, go_on).unwrap_err();
+    assert!(error.to_string().starts_with("the checkpoint does not fit: the number of unknowns"));
+}
+
+#[test]
+fn a_wrong_jacobian_is_found_at_its_entry() {
+    struct Wrong(Rosenbrock);
+    impl ResidualBlock for Wrong {
+        fn name(&self) -> &str {
+            "wrong"
+        }
+        fn elements(&self) -> &Elements {
+            self.0.elements()
+        }
+        fn residuals(&self, x: &[f64], r: &mut [f64]) {
+            self.0.residuals(x, r);
+        }
+        fn linearize(&self, x: &[f64], r: &mut [f64], j: &mut [f64]) {
+            self.0.linearize(x, r, j);
+            j[0] *= -1.0;
+        }
+    }
+    let x = [0.7, -0.3];
+    assert!(check_jacobian(&Rosenbrock::new(), &x).unwrap().unwrap().error < 1e-9);
+    let worst = check_jacobian(&Wrong(Rosenbrock::new()), &x).unwrap().unwrap();
+    assert_eq!((worst.row, worst.unknown), (0, 0));
+    assert!(worst.error > 0.5);
+    let mut elements = Elements::new();
+    elements.push(&[0, 1, 2], 3);
+    let sphere = SphereEnergy(elements);
+    assert!(check_gradient(&sphere, &[0.3, -0.4, 2.0]).unwrap().unwrap().error < 1e-8);
+}
+
+#[test]
+fn every_status_is_reached() {
+    let run = |options: &Options, x: &mut [f64; 2]| {
+        let mut problem = Problem::new(2);
+        problem.add(Rosenbrock::new());
+        solve(problem, x, options).unwrap()
+    };
+    let few = Options { max_iterations: 3, ..Options::default() };
+    let report = run(&few, &mut [-1.2, 1.0]);
+    assert_eq!((report.status, report.iterations), (Status::IterationLimit, 3));
+    let none = Options { max_iterations: 0, ..Options::default() };
+    assert_eq!(run(&none, &mut [-1.2, 1.0]).status, Status::IterationLimit);
+    // Gradient, step, energy and absolute energy rules, each alone.
+    let off = Options { gradient_tol: 0.0, step_tol: 0.0, energy_tol: 0.0, ..Options::default() };
+    for options in [
+        Options { gradient_tol: 1e-3, ..off.clone() },
+        Options { step_tol: 1e-3, ..off.clone() },
+        Options { energy_tol: 1e-3, ..off.clone() },
+        Options { abs_energy_tol: 1e-6, ..off },
+    ] {
+        assert_eq!(run(&options, &mut [-1.2, 1.0]).status, Status::Converged);
+    }
+    // A start at the minimum.
+    let report = run(&Options::default(), &mut [1.0, 1.0]);
+    assert_eq!((report.status, report.iterations), (Status::Converged, 0));
+    // A Jacobian of the wrong sign: every step leads uphill.
+    struct Uphill(Elements);
+    impl ResidualBlock for Uphill {
+        fn name(&self) -> &str {
+            "uphill"
+        }
+        fn elements(&self) -> &Elements {
+            &self.0
+        }
+        fn residuals(&self, x: &[f64], r: &mut [f64]) {
+            r[0] = 1.0 + x[0] + x[0].abs();
+        }
+        fn linearize(&self, x: &[f64], r: &mut [f64], j: &mut [f64]) {
+            self.residuals(x, r);
+            j[0] = -1.0;
+        }
+    }
+    let mut elements = Elements::new();
+    elements.push(&[0], 1);
+    let mut problem = Problem::new(1);
+    problem.add(Uphill(elements));
+    let report = solve(problem, &mut [0.5], &Options::default()).unwrap();
+    assert_ne!(report.status, Status::IterationLimit);
+    assert_eq!(report.iterations, 0);
+}
+
+#[test]
+fn bad_options_and_starts_are_refused_by_name() {
+    let solve_with = |options: &Options, x: &mut [f64]| {
+        let mut problem = Problem::new(2);
+        problem.add(Rosenbrock::new());
+        solve(problem, x, options).unwrap_err().to_string()
+    };
+    let options = Options { initial_damping: f64::NAN, ..Options::default() };
+    let message = solve_with(&options, &mut [0.0; 2]);
+    assert_eq!(message, "option initial_damping is NaN; it must be positive and finite");
+    let message = solve_with(&Options::default(), &mut [0.0, f64::NAN]);
+    assert_eq!(message, "unknown 1 starts at NaN; give a finite start");
+    let message = solve_with(&Options::default(), &mut [0.0; 3]);
+    assert!(message.starts_with("the vector of unknowns has 3 values, expected 2"));
+    let mut problem = Problem::new(2);
+    problem.set_order(vec![0, 0]);
+    let error = solve(problem, &mut [0.0; 2], &Options::default()).unwrap_err();
+    assert!(error.to_string().starts_with("the ordering is no permutation: entry 1 is 0"));
+}
+
+#[test]
+fn empty_and_rank_deficient_problems_are_solved() {
+    let report = solve(Problem::new(0), &mut [], &Options::default()).unwrap();
+    assert_eq!(report.status, Status::Converged);
+    let report = solve(Problem::new(3), &mut [1.0, 2.0, 3.0], &Options::default()).unwrap();
+    assert_eq!((report.status, report.final_energy), (Status::Converged, 0.0));
+    // Two unknowns that only occur as a sum, one that occurs nowhere, scales 16 orders apart.
+    let mut rows = QuadraticBuilder::new("sum");
+    rows.equation(1e8).linear(0, 1.0).linear(1, 1.0).constant(-2.0);
+    rows.equation(1e-8).linear(3, 1.0).constant(-5.0);
+    let mut problem = Problem::new(4);
+    problem.add(rows.build());
+    let mut x = [0.0, 0.0, 7.0, 0.0];
+    let report = solve(problem, &mut x, &Options::default()).unwrap();
+    assert_eq!(report.status, Status::Converged);
+    assert!((x[0] + x[1] - 2.0).abs() < 1e-9 && x[2] == 7.0, "{x:?}");
 }

@@ -39,9 +39,9 @@ impl WithSimd for Gram<'_> {
         // Rows are padded to whole vectors of 4; longer vectors leave a rest to the shorter tiles.
         for b in (0..self.stride).step_by(4) {
             let mut a = b;
-            while a + 3 * lanes <= self.stride {
-                tile::<S, 3>(simd, self.x, self.stride, a, b, self.product);
-                a += 3 * lanes;
+            while a + 2 * lanes <= self.stride {
+                tile::<S, 2>(simd, self.x, self.stride, a, b, self.product);
+                a += 2 * lanes;
             }
             while a + lanes <= self.stride {
                 tile::<S, 1>(simd, self.x, self.stride, a, b, self.product);

@@ -5,5 +5,5 @@ mod normal;
 mod solve;
 mod system;
 
-pub use solve::{Iteration, solve, solve_observed, solve_system};
+pub use solve::{Checkpoint, Iteration, resume_system, solve, solve_observed, solve_system};
 pub use system::{StepModel, System};

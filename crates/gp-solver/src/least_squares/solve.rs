@@ -4,6 +4,7 @@ use std::ops::ControlFlow;
 use std::time::Instant;
 
 use super::system::{StepModel, System};
+use crate::damping::DampingRule;
 use crate::error::SolverError;
 use crate::options::{Method, Options};
 use crate::problem::Problem;
@@ -11,10 +12,18 @@ use crate::report::{IterationRecord, Report, Status};
 
 /// Damping beyond which no step is worth trying.
 const MAX_DAMPING: f64 = 1e16;
-/// Damping below which it makes no difference in 64-bit numbers.
-const MIN_DAMPING: f64 = 1e-16;
+/// Least damping. Far below rounding, because the scaling `D` may have been set by a start
+/// where the diagonal was many orders larger.
+const MIN_DAMPING: f64 = 1e-60;
+/// Damping that mends a singular matrix at the least.
+const MENDING_DAMPING: f64 = 1e-16;
 /// Least share of the predicted decrease a step must bring.
 const MIN_GAIN: f64 = 1e-4;
+/// The first step may be this much longer than the start itself, in the scaled norm: longer ones
+/// tend to land on plateaus from which nothing leads back.
+const FIRST_STEP: f64 = 10.0;
+/// Factorisations spent on finding the damping for a first step of that length.
+const FIRST_STEP_TRIALS: usize = 15;
 
 /// What an observer sees after each taken step (and once at the start).
 #[derive(Clone, Copy, Debug)]
@@ -27,6 +36,35 @@ pub struct Iteration<'s> {
     pub record: &'s IterationRecord,
     /// Damping the next step begins with.
     pub damping: f64,
+    /// Scaling `D` the next step begins with, by position.
+    pub scaling: &'s [f64],
+}
+
+impl Iteration<'_> {
+    /// All that is needed to go on from here.
+    #[must_use]
+    pub fn checkpoint(&self) -> Checkpoint {
+        Checkpoint {
+            iteration: self.iteration,
+            x: self.x.to_vec(),
+            damping: self.damping,
+            scaling: self.scaling.to_vec(),
+        }
+    }
+}
+
+/// A solve between two steps. Resumed with the same problem and options it goes on to the same
+/// result, bit for bit, provided the blocks' lagged quantities are functions of the iterate.
+#[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
+pub struct Checkpoint {
+    /// Steps taken.
+    pub iteration: usize,
+    /// The iterate.
+    pub x: Vec<f64>,
+    /// Damping of the next step.
+    pub damping: f64,
+    /// Scaling of the next step, by position.
+    pub scaling: Vec<f64>,
 }
 
 /// Minimises a problem from `x`, which then holds the result.
@@ -67,15 +105,49 @@ pub fn solve_system(
     options: &Options,
     observer: impl FnMut(&Iteration<'_>) -> ControlFlow<()>,
 ) -> Result<Report, SolverError> {
+    run(system, x, options, observer, None)
+}
+
+/// Goes on from a checkpoint; `x` receives the result. The iterations of the report and of the
+/// stop rule count from the very start, its history and timings from here.
+///
+/// # Errors
+/// As [`solve`], and [`SolverError::CheckpointMismatch`] if the checkpoint is of another problem.
+pub fn resume_system(
+    system: &mut System<'_>,
+    checkpoint: &Checkpoint,
+    x: &mut [f64],
+    options: &Options,
+    observer: impl FnMut(&Iteration<'_>) -> ControlFlow<()>,
+) -> Result<Report, SolverError> {
+    let fits = |what, expected, found| match expected == found {
+        true => Ok(()),
+        false => Err(SolverError::CheckpointMismatch { what, expected, found }),
+    };
+    fits("the number of unknowns", x.len(), checkpoint.x.len())?;
+    fits("the number of free unknowns", system.variables(), checkpoint.scaling.len())?;
+    x.copy_from_slice(&checkpoint.x);
+    run(system, x, options, observer, Some(checkpoint))
+}
+
+fn run(
+    system: &mut System<'_>,
+    x: &mut [f64],
+    options: &Options,
+    observer: impl FnMut(&Iteration<'_>) -> ControlFlow<()>,
+    checkpoint: Option<&Checkpoint>,
+) -> Result<Report, SolverError> {
     options.check()?;
     if let Some(variable) = x.iter().position(|v| !v.is_finite()) {
         return Err(SolverError::StartNotFinite { variable, value: x[variable] });
     }
     let begin = Instant::now();
     let before = (system.factorizations(), system.timings());
-    let mut run = Run::new(system, x, options, observer)?;
-    let status = run.iterate()?;
-    let Run { history, gradient_norm, damping, .. } = run;
+    let mut run = Run::new(system, x, options, observer, checkpoint)?;
+    let status = run.iterate();
+    let Run { history, gradient_norm, damping, system, iterations_before, .. } = run;
+    system.keep_scaling(false);
+    let status = status?;
     let mut timings = system.timings();
     timings.residuals -= before.1.residuals;
     timings.linearize -= before.1.linearize;
@@ -92,7 +164,7 @@ pub fn solve_system(
         .collect();
     Ok(Report {
         status,
-        iterations: history.len() - 1,
+        iterations: iterations_before + history.len() - 1,
         initial_energy: history[0].energy,
         final_energy: last.energy,
         terms,
@@ -115,8 +187,10 @@ struct Run<'s, 'a, F> {
     trial: Vec<f64>,
     history: Vec<IterationRecord>,
     damping: f64,
-    /// Factor by which the next refusal raises the damping.
-    growth: f64,
+    /// Steps taken before the checkpoint this run began with.
+    iterations_before: usize,
+    /// Whether no step has been taken yet.
+    is_first: bool,
     gradient_norm: f64,
 }
 
@@ -134,13 +208,20 @@ impl<'s, 'a, F: FnMut(&Iteration<'_>) -> ControlFlow<()>> Run<'s, 'a, F> {
         x: &'s mut [f64],
         options: &'s Options,
         observer: F,
+        checkpoint: Option<&Checkpoint>,
     ) -> Result<Self, SolverError> {
         system.refresh(x);
+        system.keep_scaling(false);
         system.linearize(x)?;
+        system.keep_scaling(options.damping_rule == DampingRule::StepLength);
+        if let Some(checkpoint) = checkpoint {
+            system.set_scaling(&checkpoint.scaling);
+        }
+        let iterations_before = checkpoint.map_or(0, |c| c.iteration);
         let start = IterationRecord {
             energy: system.energy(),
-            terms: system.term_energies().to_vec(),
             decrease: 0.0,
+            terms: system.term_energies().to_vec(),
             damping: 0.0,
             step_norm: 0.0,
             gradient_norm: system.scaled_gradient_norm(),
@@ -150,8 +231,9 @@ impl<'s, 'a, F: FnMut(&Iteration<'_>) -> ControlFlow<()>> Run<'s, 'a, F> {
             trial: x.to_vec(),
             gradient_norm: start.gradient_norm,
             history: vec![start],
-            damping: options.initial_damping,
-            growth: options.damping_rule.first_growth(),
+            damping: checkpoint.map_or(options.initial_damping, |c| c.damping),
+            is_first: iterations_before == 0,
+            iterations_before,
             system,
             x,
             options,
@@ -169,7 +251,7 @@ impl<'s, 'a, F: FnMut(&Iteration<'_>) -> ControlFlow<()>> Run<'s, 'a, F> {
             {
                 return Ok(Status::Converged);
             }
-            if self.history.len() > self.options.max_iterations {
+            if self.iterations_before + self.history.len() > self.options.max_iterations {
                 return Ok(Status::IterationLimit);
             }
             let taken = match self.options.method {
@@ -196,7 +278,7 @@ impl<'s, 'a, F: FnMut(&Iteration<'_>) -> ControlFlow<()>> Run<'s, 'a, F> {
         }
     }
 
-    /// Levenberg-Marquardt: raises the damping until a step lowers the energy.
+    /// Levenberg-Marquardt: changes the damping by the rule until a step lowers the energy.
     fn damped_step(&mut self) -> Result<Result<Taken, Status>, SolverError> {
         let (energy, rule) = (self.system.energy(), self.options.damping_rule);
         let mut factorizations = 0;
@@ -204,43 +286,54 @@ impl<'s, 'a, F: FnMut(&Iteration<'_>) -> ControlFlow<()>> Run<'s, 'a, F> {
             factorizations += 1;
             let damping = self.damping;
             let model = match self.system.damped_step(damping) {
-                Ok(model) => Some(model),
+                Ok(model) => model,
                 // Damping mends an indefinite or singular matrix, like any bad step.
-                Err(SolverError::NotPositiveDefinite { .. }) => None,
+                Err(SolverError::NotPositiveDefinite { .. }) => {
+                    self.damping = (10.0 * damping).max(MENDING_DAMPING);
+                    if self.damping > MAX_DAMPING {
+                        return Ok(Err(self.stalled()));
+                    }
+                    continue;
+                }
                 Err(other) => return Err(other),
             };
-            let mut decrease = f64::NAN;
-            if let Some(model) = model {
-                self.system.stepped_into(self.x, &mut self.trial);
-                decrease = energy - self.system.energy_at(&self.trial);
-                let gain = decrease / model.predicted_decrease;
-                if decrease >= 0.0 && gain >= MIN_GAIN {
-                    let factor = rule.after_success(gain);
-                    self.damping = (damping * factor).max(MIN_DAMPING);
-                    self.growth = rule.first_growth();
-                    return Ok(Ok(Taken {
-                        model,
-                        actual_decrease: decrease,
-                        damping,
-                        factorizations,
-                    }));
-                }
-                // So short a step cannot change the iterate: this is as low as it gets.
-                let short = model.scaled_norm <= f64::EPSILON * self.system.scaled_norm(self.x);
-                let flat = model.predicted_decrease <= self.options.energy_tol * energy
-                    && decrease.abs() <= self.options.energy_tol * energy;
-                if short || flat {
-                    return Ok(Err(Status::Converged));
+            if self.is_first
+                && rule == DampingRule::StepLength
+                && factorizations < FIRST_STEP_TRIALS
+            {
+                let longest = FIRST_STEP * self.system.scaled_norm(self.x);
+                if longest > 0.0 && model.scaled_norm > 1.1 * longest {
+                    let wanted = self.system.damping_for_radius(damping, longest);
+                    self.damping = wanted.max(1.1 * damping);
+                    continue;
                 }
             }
-            self.damping = damping * self.growth;
-            self.growth = rule.next_growth(self.growth);
+            self.system.stepped_into(self.x, &mut self.trial);
+            let decrease = energy - self.system.energy_at(&self.trial);
+            let gain = decrease / model.predicted_decrease;
+            if decrease >= 0.0 && gain >= MIN_GAIN {
+                self.damping = rule.after_success(self.system, damping, model, gain);
+                self.damping = self.damping.max(MIN_DAMPING);
+                return Ok(Ok(Taken { model, actual_decrease: decrease, damping, factorizations }));
+            }
+            // So short a step cannot change the iterate: this is as low as it gets.
+            let short = model.scaled_norm <= f64::EPSILON * self.system.scaled_norm(self.x);
+            let flat = model.predicted_decrease <= self.options.energy_tol * energy
+                && decrease.abs() <= self.options.energy_tol * energy;
+            if short || flat {
+                return Ok(Err(Status::Converged));
+            }
+            self.damping = rule.after_refusal(self.system, damping, model, decrease);
             tracing::trace!(damping, decrease, "step refused");
-            if !(self.damping <= MAX_DAMPING) {
-                self.damping = MAX_DAMPING;
-                return Ok(Err(Status::Stalled));
+            if self.damping > MAX_DAMPING {
+                return Ok(Err(self.stalled()));
             }
         }
+    }
+
+    fn stalled(&mut self) -> Status {
+        self.damping = MAX_DAMPING;
+        Status::Stalled
     }
 
     /// Guided projection: the step is taken whatever it does.
@@ -261,12 +354,13 @@ impl<'s, 'a, F: FnMut(&Iteration<'_>) -> ControlFlow<()>> Run<'s, 'a, F> {
     fn take(&mut self, taken: &Taken) -> Result<(), SolverError> {
         let step_norm = self.system.step().iter().map(|s| s * s).sum::<f64>().sqrt();
         self.x.copy_from_slice(&self.trial);
+        self.is_first = false;
         self.system.refresh(self.x);
         let energy = self.system.linearize(self.x)?;
         let record = IterationRecord {
             energy,
-            terms: self.system.term_energies().to_vec(),
             decrease: taken.actual_decrease,
+            terms: self.system.term_energies().to_vec(),
             damping: taken.damping,
             step_norm,
             gradient_norm: self.gradient_norm,
@@ -287,10 +381,11 @@ impl<'s, 'a, F: FnMut(&Iteration<'_>) -> ControlFlow<()>> Run<'s, 'a, F> {
 
     fn observe(&mut self) -> ControlFlow<()> {
         (self.observer)(&Iteration {
-            iteration: self.history.len() - 1,
+            iteration: self.iterations_before + self.history.len() - 1,
             x: self.x,
             record: &self.history[self.history.len() - 1],
             damping: self.damping,
+            scaling: self.system.scaling(),
         })
     }
 }

@@ -32,6 +32,9 @@ pub struct System<'a> {
     matrix: Vec<f64>,
     gradient: Vec<f64>,
     diagonal: Vec<f64>,
+    /// Scaling `D` of steps: the diagonal, or its running maximum.
+    scaling: Vec<f64>,
+    keeps_scaling: bool,
     terms: Vec<f64>,
     trial: Vec<f64>,
     shift: Vec<f64>,
@@ -47,7 +50,7 @@ pub struct System<'a> {
 pub struct StepModel {
     /// Decrease of the energy the linear model foresees.
     pub predicted_decrease: f64,
-    /// `‖s‖_D` with `D = diag A`.
+    /// `‖s‖_D` with `D` the scaling.
     pub scaled_norm: f64,
 }
 
@@ -76,6 +79,8 @@ impl<'a> System<'a> {
             matrix: vec![0.0; factor.values_len()],
             gradient: vec![0.0; n],
             diagonal: vec![0.0; n],
+            scaling: vec![0.0; n],
+            keeps_scaling: false,
             terms: vec![0.0; problem.blocks.len()],
             trial: vec![0.0; problem.blocks.len()],
             shift: vec![0.0; n],
@@ -141,6 +146,23 @@ impl<'a> System<'a> {
     #[must_use]
     pub fn diagonal(&self) -> &[f64] {
         &self.diagonal
+    }
+
+    /// Scaling `D` of Levenberg-Marquardt steps, by position: the [diagonal](Self::diagonal), or,
+    /// within a solve, the largest it has been (Moré 1978).
+    #[must_use]
+    pub fn scaling(&self) -> &[f64] {
+        &self.scaling
+    }
+
+    /// Makes the scaling the running maximum of the diagonal from here on, or its last value.
+    pub(crate) fn keep_scaling(&mut self, keep: bool) {
+        self.keeps_scaling = keep;
+    }
+
+    /// Takes up a scaling from a checkpoint.
+    pub(crate) fn set_scaling(&mut self, scaling: &[f64]) {
+        self.scaling.copy_from_slice(scaling);
     }
 
     /// The last step, by position.
@@ -265,6 +287,8 @@ impl<'a> System<'a> {
             let size = self.problem.scale[self.plan.variable[i]];
             // Exact Hessians of energies can have negative diagonals.
             self.diagonal[i] = if a != 0.0 { a.abs() } else { 1.0 / (size * size) };
+            let least = if self.keeps_scaling { self.scaling[i] } else { 0.0 };
+            self.scaling[i] = self.diagonal[i].max(least);
         }
     }
 
@@ -286,16 +310,37 @@ impl<'a> System<'a> {
         self.trial.iter().sum()
     }
 
-    /// Solves `(A + μ diag A) s = −g` at the last linearisation; the step is then in
-    /// [`step`](Self::step).
+    /// Solves `(A + μ D) s = −g` at the last linearisation, with `D` the
+    /// [scaling](Self::scaling); the step is then in [`step`](Self::step).
     ///
     /// # Errors
     /// [`SolverError::NotPositiveDefinite`] names the unknown.
     pub fn damped_step(&mut self, damping: f64) -> Result<StepModel, SolverError> {
-        for (s, &d) in self.shift.iter_mut().zip(&self.diagonal) {
+        for (s, &d) in self.shift.iter_mut().zip(&self.scaling) {
             *s = damping * d;
         }
         self.shifted_step()
+    }
+
+    /// The damping that would make the last [damped step](Self::damped_step), taken with
+    /// `damping`, about `radius` long in the norm `‖s‖_D`: one Newton step on `1/‖s(μ)‖_D`
+    /// (Hebden 1973), which costs a solve with the factorisation at hand.
+    #[must_use]
+    pub fn damping_for_radius(&mut self, damping: f64, radius: f64) -> f64 {
+        let begin = Instant::now();
+        let mut image: Vec<f64> = self.step.iter().zip(&self.scaling).map(|(s, d)| s * d).collect();
+        let square: f64 = image.iter().zip(&self.step).map(|(a, b)| a * b).sum();
+        self.factor.solve_in_place(&mut image);
+        let bend: f64 =
+            (self.step.iter().zip(&self.scaling).zip(&image)).map(|((s, d), w)| s * d * w).sum();
+        self.timings.solve += begin.elapsed();
+        let norm = square.sqrt();
+        (damping + (norm - radius) / radius * square / bend).max(0.0)
+    }
+
+    /// Slope of the energy along the last step, `g·s`.
+    pub(crate) fn slope(&self) -> f64 {
+        self.gradient.iter().zip(&self.step).map(|(g, s)| g * s).sum()
     }
 
     /// Solves `(A + ε² I) s = −g` at the last linearisation, distances in the unknowns' scale.
@@ -334,7 +379,7 @@ impl<'a> System<'a> {
         for i in 0..self.step.len() {
             let s = self.step[i];
             decrease += 0.5 * s * (self.shift[i] * s - self.gradient[i]);
-            square += self.diagonal[i] * s * s;
+            square += self.scaling[i] * s * s;
         }
         Ok(StepModel { predicted_decrease: decrease, scaled_norm: square.sqrt() })
     }
@@ -354,7 +399,7 @@ impl<'a> System<'a> {
     #[must_use]
     pub fn scaled_norm(&self, x: &[f64]) -> f64 {
         let term = |(&i, &d): (&usize, &f64)| d * x[i] * x[i];
-        self.plan.variable.iter().zip(&self.diagonal).map(term).sum::<f64>().sqrt()
+        self.plan.variable.iter().zip(&self.scaling).map(term).sum::<f64>().sqrt()
     }
 
     /// `max_i |g_i| / √(A_ii · 2E)`, 0 where the energy is.

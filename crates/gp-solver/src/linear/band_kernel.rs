@@ -91,8 +91,7 @@ fn subtract_product<S: Simd, const R: usize, const C: usize, const G: usize, con
     b: &[[f64; G]],
     target: &mut [[S::f64s; R]],
 ) {
-    let target: &mut [[S::f64s; R]; C] =
-        (&mut target[C * PART..C * (PART + 1)]).try_into().expect("C columns");
+    let target = &mut target[C * PART..C * (PART + 1)];
     let mut sums = [[simd.splat_f64s(0.0); R]; C];
     for (a, b) in a.iter().zip(b) {
         for c in 0..C {
@@ -109,7 +108,7 @@ fn subtract_product<S: Simd, const R: usize, const C: usize, const G: usize, con
     }
 }
 
-/// `T −= A Bᵀ` for a whole block. `G = 3 C` rows make `R` vectors.
+/// `T −= A Bᵀ` for a whole block. `G` rows, `3 C` or `4 C`, make `R` vectors.
 #[inline(always)]
 fn subtract_block<S: Simd, const R: usize, const C: usize, const G: usize>(
     simd: S,
@@ -124,17 +123,21 @@ fn subtract_block<S: Simd, const R: usize, const C: usize, const G: usize>(
         subtract_product::<S, R, C, G, 0>(simd, a, b, target);
         subtract_product::<S, R, C, G, 1>(simd, a, b, target);
         subtract_product::<S, R, C, G, 2>(simd, a, b, target);
+        if G == 4 * C {
+            subtract_product::<S, R, C, G, 3>(simd, a, b, target);
+        }
     }
 }
 
-/// Calls `$method` with the tile that suits the vector length.
+/// Calls `$method` with the tile that suits the vector length. Of 16 registers a tile of 3 × 4
+/// would need every one, and the compiler then spills a sum in the innermost loop.
 macro_rules! with_tile {
     ($self:ident, $simd:ident, $method:ident) => {
         match S::F64_LANES {
             8 => $self.$method::<S, 3, 8, 24>($simd),
-            4 => $self.$method::<S, 3, 4, 12>($simd),
-            2 => $self.$method::<S, 6, 4, 12>($simd),
-            _ => $self.$method::<S, 12, 4, 12>($simd),
+            4 => $self.$method::<S, 3, 3, 12>($simd),
+            2 => $self.$method::<S, 6, 3, 12>($simd),
+            _ => $self.$method::<S, 12, 3, 12>($simd),
         }
     };
 }
