@@ -31,6 +31,16 @@ const TAKEN_CHANGE: (f64, f64) = (1e-3, 10.0);
 const REFUSED_CHANGE: (f64, f64) = (1.5, 1e3);
 
 impl DampingRule {
+    /// The damping this rule does not go below.
+    pub(crate) fn least_damping(self) -> f64 {
+        match self {
+            // Far below rounding, because the scaling may have been set by a start where the
+            // diagonal was many orders larger.
+            Self::StepLength => 1e-60,
+            Self::Fivefold => 1e-16,
+        }
+    }
+
     /// The damping after a taken step.
     pub(crate) fn after_success(
         self,

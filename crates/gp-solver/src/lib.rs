@@ -1,4 +1,40 @@
 //! Sparse nonlinear least squares and the other optimisers the methods of the workspace stand on.
+//!
+//! A [`Problem`] is a vector of unknowns and blocks: [`ResidualBlock`]s (rows that share their
+//! unknowns come as [`Elements`]), [`EnergyBlock`]s, and [`QuadraticConstraints`] from coefficient
+//! triplets. [`solve`] minimises it by Levenberg-Marquardt or undamped guided projection
+//! ([`Options`]); the [`Report`] names the energy of every term at every iteration. Patterns,
+//! ordering and scatter are planned once per topology; the normal equations go to
+//! [`BandCholesky`] or [`SparseCholesky`], whichever the structure makes cheaper. Results do not
+//! depend on the number of threads, bit for bit.
+//!
+//! Besides: [`lbfgs`] with a [`Metric`], [`DenseQp`] and [`SparseEqualityQp`],
+//! [`MinNormProjection`] onto constraints, and [`check_jacobian`] for a block of one's own.
+//!
+//! # Example
+//! A circle through noisy points, each of which is one quadratic equation
+//! `(p − a)² + (q − b)² = r²` in the unknowns `a, b, r`:
+//! ```
+//! use gp_solver::{Options, Problem, QuadraticBuilder, Status, solve};
+//!
+//! let mut circle = QuadraticBuilder::new("circle");
+//! for k in 0..20 {
+//!     let angle = 0.3 * f64::from(k);
+//!     let noise = 1e-3 * (7.0 * angle).sin();
+//!     let (p, q) = (2.0 + (3.0 + noise) * angle.cos(), 1.0 + (3.0 + noise) * angle.sin());
+//!     let row = circle.equation(1.0);
+//!     row.product(0, 0, 1.0).product(1, 1, 1.0).product(2, 2, -1.0);
+//!     row.linear(0, -2.0 * p).linear(1, -2.0 * q).constant(p * p + q * q);
+//! }
+//! let mut problem = Problem::new(3);
+//! problem.add(circle.build());
+//! let mut x = [0.0, 0.0, 1.0];
+//! let report = solve(problem, &mut x, &Options::default())?;
+//! assert_eq!(report.status, Status::Converged);
+//! assert!((x[0] - 2.0).abs() < 1e-3 && (x[1] - 1.0).abs() < 1e-3);
+//! assert!((x[2].abs() - 3.0).abs() < 1e-3);
+//! # Ok::<(), gp_solver::SolverError>(())
+//! ```
 
 mod check;
 mod damping;

@@ -12,9 +12,6 @@ use crate::report::{IterationRecord, Report, Status};
 
 /// Damping beyond which no step is worth trying.
 const MAX_DAMPING: f64 = 1e16;
-/// Least damping. Far below rounding, because the scaling `D` may have been set by a start
-/// where the diagonal was many orders larger.
-const MIN_DAMPING: f64 = 1e-60;
 /// Damping that mends a singular matrix at the least.
 const MENDING_DAMPING: f64 = 1e-16;
 /// Least share of the predicted decrease a step must bring.
@@ -313,7 +310,7 @@ impl<'s, 'a, F: FnMut(&Iteration<'_>) -> ControlFlow<()>> Run<'s, 'a, F> {
             let gain = decrease / model.predicted_decrease;
             if decrease >= 0.0 && gain >= MIN_GAIN {
                 self.damping = rule.after_success(self.system, damping, model, gain);
-                self.damping = self.damping.max(MIN_DAMPING);
+                self.damping = self.damping.max(rule.least_damping());
                 return Ok(Ok(Taken { model, actual_decrease: decrease, damping, factorizations }));
             }
             // So short a step cannot change the iterate: this is as low as it gets.
