@@ -136,6 +136,7 @@ impl Level {
             initial_damping: damping.unwrap_or(defaults.initial_damping),
             damping_rule: DampingRule::Fivefold,
             gradient_tol: GRADIENT_TOL,
+            step_tol: 1e-10,
             abs_energy_tol: 0.5 * self.grid.len() as f64 * rounding * rounding,
             ..defaults
         };
