@@ -13,6 +13,7 @@ mod demo;
 mod fair;
 mod fit;
 mod hnet;
+mod panel;
 mod weingarten;
 
 use crate::context::Context;
@@ -60,6 +61,8 @@ commands! {
     fit::Fit,
     /// Minimise a curvature functional of a subdivision surface
     fair::Fair,
+    /// Cut a surface into panels and find the molds they are made on
+    panel::Panel,
     /// Optimise a B-spline surface towards a Weingarten surface
     weingarten::Weingarten,
     /// Turn quads along asymptotic directions into a smooth skin of ruled patches

@@ -26,6 +26,9 @@ pub(crate) struct Fit {
 
 /// A round that lowers the energy by less than this share ends the alternation.
 pub(crate) const STALL: f64 = 2e-3;
+/// Mean squared residual of a sample, in panel sizes and radians, at which a fit is exact to
+/// rounding and nothing is left to improve.
+pub(crate) const EXACT: f64 = 1e-28;
 /// Gauss-Newton steps of a registration per round.
 const REGISTRATION_STEPS: usize = 2;
 /// Damping of a registration, a share of the mean diagonal.
@@ -97,7 +100,8 @@ impl Fit {
             let stalled =
                 history.last().is_some_and(|&before: &f64| energy > (1.0 - STALL) * before);
             history.push(energy);
-            if stalled && round > 2 {
+            let is_exact = energy <= EXACT * set.samples.points.len() as f64;
+            if is_exact || (stalled && round > 2) {
                 break;
             }
         }

@@ -6,7 +6,7 @@
 //! preconditioned conjugate gradients on the Jacobian blocks of the seams: the shared molds would
 //! fill a factorisation with a dense border.
 
-use crate::fit::Fit;
+use crate::fit::{EXACT, Fit};
 use crate::mold::MAX_PARAMETERS;
 use crate::panels::PanelSet;
 use crate::panels::SEAM_SAMPLES;
@@ -102,7 +102,8 @@ pub(crate) fn improve(
     let mut history = vec![energy];
     let mut damping = 1e-4;
     let mut step = 0;
-    while step < options.steps {
+    let exact = EXACT * set.edges.points.len() as f64;
+    while step < options.steps && energy > exact {
         let system = System::linearize(set, fit, options, weights, &incident);
         let mut accepted = false;
         // A refused step is tried again with more damping on the same linearisation.

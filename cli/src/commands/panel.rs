@@ -1,0 +1,488 @@
+//! `umbilic panel SURFACE -o OUT`.
+
+use crate::args::{ConfigArgs, ConvergedArgs, Counts, check_output_path};
+use crate::context::Context;
+use crate::failure::Failure;
+use crate::layered;
+use crate::outcome::{Outcome, Status};
+use bspline::BsplineSurface;
+use exchange::{Group, LengthUnit, Mesh, Model, NamedSurface};
+use paneling::{
+    Bounded, Bounds, Clustering, DiagramAxis, Layout, Mold, MoldType, Options, PanelRow, PanelSet,
+    Paneling, Pattern, PriceList, mold_count, panel, panel_within,
+};
+use serde::{Deserialize, Serialize};
+use std::path::{Path, PathBuf};
+
+/// Arguments of `panel`.
+#[derive(Debug, clap::Args)]
+#[command(
+    after_help = "Example: umbilic panel fixtures/roof.ron --panels 30x30 --k 3 -o panels.glb -o panels.csv -o molds.step"
+)]
+pub(crate) struct Panel {
+    /// File with one B-spline surface
+    surface: PathBuf,
+    /// Where to write (repeatable): panels as glb or obj, their table as csv or ron, molds as step
+    #[arg(short, long = "output", value_name = "FILE", required = true)]
+    output: Vec<PathBuf>,
+    #[command(flatten)]
+    options: PanelOptions,
+    #[command(flatten)]
+    config: ConfigArgs,
+    #[command(flatten)]
+    converged: ConvergedArgs,
+}
+
+/// Options that may also stand in the configuration file.
+#[derive(Debug, Default, clap::Args, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub(crate) struct PanelOptions {
+    /// Number of panels in u and v (default 30x30)
+    #[arg(long, value_name = "UxV")]
+    panels: Option<Counts>,
+    /// quad (default), staggered, triangle, hexagon, diagonal, or an OBJ file over the unit square
+    #[arg(long, value_name = "LAYOUT")]
+    layout: Option<String>,
+    /// Equal steps of mean arc length instead of equal parameter steps
+    #[arg(long, num_args = 0, default_missing_value = "true")]
+    equal_arc_length: Option<bool>,
+    /// own (default): by panel shape; grid: the published grid over the curvature diagram;
+    /// cover: greedy covering by cost
+    #[arg(long, value_name = "NAME")]
+    clustering: Option<String>,
+    /// k √N molds for N panels (default 3)
+    #[arg(long)]
+    k: Option<f64>,
+    /// Number of molds
+    #[arg(long, value_name = "M")]
+    molds: Option<usize>,
+    /// Find the cheapest molds with every kink at most this
+    #[arg(long, value_name = "X")]
+    max_kink_deg: Option<f64>,
+    /// Find the cheapest molds with every gap at most this, in model units
+    #[arg(long, value_name = "L")]
+    max_gap: Option<f64>,
+    /// Types of molds: plane, cylinder, sphere, paraboloid, torus, cubic (default cubic); several
+    /// only together with bounds
+    #[arg(long, value_name = "TYPES", value_delimiter = ',')]
+    mold_types: Option<Vec<MoldType>>,
+    /// Prices of molds and panels by type (RON)
+    #[arg(long, value_name = "FILE.ron")]
+    prices: Option<PathBuf>,
+    /// Most steps of the joint seam step (default 8); 0 leaves it out
+    #[arg(long, value_name = "N")]
+    seam_steps: Option<usize>,
+}
+
+layered!(PanelOptions {
+    panels,
+    layout,
+    equal_arc_length,
+    clustering,
+    k,
+    molds,
+    max_kink_deg,
+    max_gap,
+    mold_types,
+    prices,
+    seam_steps,
+});
+
+/// How the number of molds is chosen.
+enum MoldRule {
+    PerRoot(f64),
+    Count(usize),
+    Bounds(Bounds),
+}
+
+impl PanelOptions {
+    fn rule(&self) -> Result<Option<MoldRule>, Failure> {
+        let has_bounds = self.max_kink_deg.is_some() || self.max_gap.is_some();
+        let rules = [self.k.is_some(), self.molds.is_some(), has_bounds];
+        if rules.iter().filter(|r| **r).count() > 1 {
+            return Err(Failure::usage(
+                "k, molds and the bounds max-kink-deg, max-gap exclude one another; keep one",
+            ));
+        }
+        if let Some(k) = self.k.filter(|k| !(*k > 0.0 && k.is_finite())) {
+            return Err(Failure::usage(format!("k is {k}; it must be positive")));
+        }
+        let bounds =
+            Bounds { max_kink: self.max_kink_deg.map(f64::to_radians), max_gap: self.max_gap };
+        Ok(match (self.k, self.molds) {
+            (Some(k), _) => Some(MoldRule::PerRoot(k)),
+            (_, Some(molds)) => Some(MoldRule::Count(molds)),
+            _ => has_bounds.then_some(MoldRule::Bounds(bounds)),
+        })
+    }
+
+    fn clustering(&self) -> Result<Clustering, Failure> {
+        match self.clustering.as_deref() {
+            None | Some("own") => Ok(Clustering::Own),
+            Some("grid") => Ok(Clustering::Grid(DiagramAxis::SignedRoot)),
+            Some("cover") => Ok(Clustering::Cover),
+            Some(other) => {
+                Err(Failure::usage(format!("unknown clustering `{other}`; use own, grid or cover")))
+            }
+        }
+    }
+
+    fn layout(&self, surface: &BsplineSurface) -> Result<Layout, Failure> {
+        let name = self.layout.as_deref().unwrap_or("quad");
+        let layout = if let Some(pattern) = Pattern::from_name(name) {
+            let Counts { u, v } = self.panels.unwrap_or(Counts { u: 30, v: 30 });
+            let closed = [surface.knots_u().is_periodic(), surface.knots_v().is_periodic()];
+            Layout::generate(pattern, u, v, closed).map_err(Failure::usage)?
+        } else if name.to_lowercase().ends_with(".obj") {
+            if self.panels.is_some() {
+                let message = "panels has no meaning with a layout file; drop one of the two";
+                return Err(Failure::usage(message));
+            }
+            layout_file(Path::new(name))?
+        } else {
+            return Err(Failure::usage(format!(
+                "unknown layout `{name}`; use quad, staggered, triangle, hexagon, diagonal or an OBJ file"
+            )));
+        };
+        let even = self.equal_arc_length.unwrap_or(false);
+        Ok(if even { layout.with_equal_arc_length(surface) } else { layout })
+    }
+}
+
+fn layout_file(path: &Path) -> Result<Layout, Failure> {
+    let model = exchange::read_model(path).map_err(|e| Failure::input(path, e))?;
+    let mesh = model.meshes.iter().find(|m| !m.faces.is_empty()).ok_or_else(|| {
+        Failure::input(path, "no faces; a layout is a polygon mesh over the unit square")
+    })?;
+    let vertices: Vec<[f64; 3]> = mesh.positions.iter().map(|p| p.to_array()).collect();
+    let faces: Vec<Vec<usize>> =
+        mesh.faces.iter().map(|f| f.iter().map(|v| *v as usize).collect()).collect();
+    Layout::from_polygons(&vertices, &faces).map_err(|e| Failure::input(path, e))
+}
+
+impl Panel {
+    pub(crate) fn run(self, _context: &Context) -> Result<Outcome, Failure> {
+        self.check_outputs()?;
+        let mut config: PanelOptions = self.config.load()?;
+        if self.options.rule()?.is_some() {
+            // A rule on the command line replaces whatever rule the file has.
+            config =
+                PanelOptions { k: None, molds: None, max_kink_deg: None, max_gap: None, ..config };
+        }
+        let options = self.options.over(config);
+        let rule = options.rule()?.unwrap_or(MoldRule::PerRoot(3.0));
+        let (surface, unit) = read_surface(&self.surface)?;
+        let layout = options.layout(&surface)?;
+        let set = PanelSet::new(&surface, &layout).map_err(|e| Failure::input(&self.surface, e))?;
+        let prices = match &options.prices {
+            None => PriceList::counting_molds(),
+            Some(path) => exchange::read_ron(path).map_err(|e| Failure::input(path, e))?,
+        };
+        let result = solve(&set, &options, &rule, &prices)?;
+        let paneling = &result.bounded.paneling;
+        let table = paneling.table(&set);
+        let mut outcome = Outcome::new(result.status, result.iterations)
+            .with_input(&self.surface)
+            .with_metrics(&PanelMetrics {
+                chosen: Quality::new(&set, paneling),
+                cost: result.bounded.cost,
+                worst_excess: result.worst_excess,
+                grid: result.grid.as_ref().map(|grid| Quality::new(&set, grid)),
+            })?;
+        outcome.require_converged = self.converged.require_converged;
+        outcome.summary = summary(&set, &result, &unit);
+        for path in self.output {
+            let bytes = encode(&path, &set, paneling, &table, &unit)?;
+            outcome.files.push((path, bytes));
+        }
+        Ok(outcome)
+    }
+
+    fn check_outputs(&self) -> Result<(), Failure> {
+        for (k, path) in self.output.iter().enumerate() {
+            if self.output[..k].contains(path) {
+                let message = format!("{}: named twice as an output; drop one", path.display());
+                return Err(Failure::usage(message));
+            }
+            let extension = exchange::extension_of(path);
+            if !["csv", "ron", "step", "stp", "glb", "obj"].contains(&extension.as_str()) {
+                return Err(Failure::input(
+                    path,
+                    "panels are written as glb or obj, their table as csv or ron, molds as step",
+                ));
+            }
+            check_output_path(path)?;
+        }
+        Ok(())
+    }
+}
+
+fn read_surface(path: &Path) -> Result<(BsplineSurface, LengthUnit), Failure> {
+    let mut model = exchange::read_model(path).map_err(|e| Failure::input(path, e))?;
+    let found = model.surfaces.len();
+    match model.surfaces.pop() {
+        Some(named) if found == 1 => Ok((named.surface, model.unit)),
+        _ => Err(Failure::input(
+            path,
+            format!("{found} B-spline surfaces; panel works on exactly one"),
+        )),
+    }
+}
+
+struct Solved {
+    bounded: Bounded,
+    status: Status,
+    iterations: usize,
+    worst_excess: Option<f64>,
+    grid: Option<Paneling>,
+}
+
+fn solve(
+    set: &PanelSet,
+    options: &PanelOptions,
+    rule: &MoldRule,
+    prices: &PriceList,
+) -> Result<Solved, Failure> {
+    let types = options.mold_types.clone().unwrap_or_else(|| vec![MoldType::Cubic]);
+    let mut settings = Options::with_molds(match rule {
+        MoldRule::PerRoot(k) => mold_count(*k, set.len()),
+        MoldRule::Count(molds) => *molds,
+        MoldRule::Bounds(_) => 1,
+    });
+    settings.clustering = options.clustering()?;
+    settings.seam_steps = options.seam_steps.unwrap_or(settings.seam_steps);
+    prices.check(&types).map_err(|e| match &options.prices {
+        Some(path) => Failure::input(path, e),
+        None => Failure::usage(e),
+    })?;
+    let (bounded, worst_excess) = match rule {
+        MoldRule::Bounds(bounds) => {
+            let found =
+                panel_within(set, bounds, &types, prices, &settings).map_err(Failure::usage)?;
+            let worst = found.worst_excess;
+            (found, Some(worst))
+        }
+        _ => {
+            let [kind] = types[..] else {
+                return Err(Failure::usage(
+                    "several mold types need bounds to choose by; add max-kink-deg or max-gap",
+                ));
+            };
+            settings.mold_type = kind;
+            let paneling = panel(set, &settings).map_err(Failure::usage)?;
+            let cost = paneling.cost(prices);
+            let bounded =
+                Bounded { paneling, is_within: true, worst_excess: 0.0, cost, attempts: 1 };
+            (bounded, None)
+        }
+    };
+    let grid = match settings.clustering {
+        Clustering::Own => {
+            let grid = Options {
+                clustering: Clustering::Grid(DiagramAxis::SignedRoot),
+                molds: bounded.paneling.molds.len(),
+                mold_type: types.iter().copied().max().unwrap_or(MoldType::Cubic),
+                ..settings
+            };
+            Some(panel(set, &grid).map_err(Failure::usage)?)
+        }
+        Clustering::Grid(_) => Some(bounded.paneling.clone()),
+        Clustering::Cover => None,
+    };
+    let status = match rule {
+        MoldRule::Bounds(_) if bounded.is_within => Status::Converged,
+        MoldRule::Bounds(_) => Status::Infeasible,
+        _ if bounded.paneling.has_settled() => Status::Converged,
+        _ => Status::IterationLimit,
+    };
+    let iterations =
+        bounded.paneling.fit_history.len() + bounded.paneling.seam_history.len().saturating_sub(1);
+    Ok(Solved { bounded, status, iterations, worst_excess, grid })
+}
+
+/// The `metrics` object.
+#[derive(Serialize)]
+struct PanelMetrics {
+    #[serde(flatten)]
+    chosen: Quality,
+    cost: f64,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    worst_excess: Option<f64>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    grid: Option<Quality>,
+}
+
+/// How well the panels of one paneling meet.
+#[derive(Serialize)]
+struct Quality {
+    panels: usize,
+    molds: usize,
+    kink_median_deg: f64,
+    kink_p95_deg: f64,
+    kink_max_deg: f64,
+    gap_median: f64,
+    gap_p95: f64,
+    gap_max: f64,
+    gap_median_percent: f64,
+    gap_p95_percent: f64,
+    gap_max_percent: f64,
+    deviation_max_percent: f64,
+}
+
+impl Quality {
+    fn new(set: &PanelSet, paneling: &Paneling) -> Self {
+        let (kinks, gaps) = (paneling.measures.kinks, paneling.measures.gaps);
+        let percent = |length: f64| set.percent_of_diagonal(length);
+        Self {
+            panels: set.len(),
+            molds: paneling.molds.len(),
+            kink_median_deg: kinks.median.to_degrees(),
+            kink_p95_deg: kinks.p95.to_degrees(),
+            kink_max_deg: kinks.max.to_degrees(),
+            gap_median: gaps.median,
+            gap_p95: gaps.p95,
+            gap_max: gaps.max,
+            gap_median_percent: percent(gaps.median),
+            gap_p95_percent: percent(gaps.p95),
+            gap_max_percent: percent(gaps.max),
+            deviation_max_percent: percent(paneling.measures.max_deviation()),
+        }
+    }
+}
+
+fn summary(set: &PanelSet, result: &Solved, unit: &LengthUnit) -> Vec<String> {
+    let paneling = &result.bounded.paneling;
+    let quality = Quality::new(set, paneling);
+    let mut lines = vec![
+        format!(
+            "{} panels on {} molds, cost {:.2}",
+            quality.panels, quality.molds, result.bounded.cost
+        ),
+        format!(
+            "  kinks: median {:.4}°, 95 % below {:.4}°, largest {:.4}°",
+            quality.kink_median_deg, quality.kink_p95_deg, quality.kink_max_deg
+        ),
+        format!(
+            "  gaps: median {:.3e}, 95 % below {:.3e}, largest {:.3e} {unit}",
+            quality.gap_median, quality.gap_p95, quality.gap_max
+        ),
+        format!("  design met within {:.5} % of the diagonal", quality.deviation_max_percent),
+    ];
+    let counts = MoldType::ALL.map(|t| (t, paneling.molds.iter().filter(|m| m.kind == t).count()));
+    let used: Vec<String> = counts
+        .iter()
+        .filter(|(_, n)| *n > 0)
+        .map(|(kind, n)| format!("{n} {}", kind.name()))
+        .collect();
+    lines.push(format!("  molds by type: {}", used.join(", ")));
+    if result.status == Status::Infeasible {
+        let excess = result.bounded.worst_excess;
+        lines.push(format!(
+            "  the bounds are not met: the worst seam is {excess:.2} times beyond them"
+        ));
+    }
+    for s in paneling.measures.worst_kinks(3) {
+        let seam = &paneling.measures.seams[s];
+        let ([a, b], kink) = (seam.panels, seam.max_kink().to_degrees());
+        lines.push(format!("  worst seam: panels {a} and {b}, kink {kink:.4}°"));
+    }
+    lines
+}
+
+/// The RON form of a paneling.
+#[derive(Serialize)]
+struct PanelingFile<'a> {
+    molds: &'a [Mold],
+    panels: &'a [PanelRow],
+}
+
+fn encode(
+    path: &Path,
+    set: &PanelSet,
+    paneling: &Paneling,
+    table: &[PanelRow],
+    unit: &LengthUnit,
+) -> Result<Vec<u8>, Failure> {
+    match exchange::extension_of(path).as_str() {
+        "csv" => Ok(csv(table).into_bytes()),
+        "ron" => {
+            let file = PanelingFile { molds: &paneling.molds, panels: table };
+            exchange::to_ron(&file).map(String::into_bytes).map_err(Failure::other)
+        }
+        "step" | "stp" => {
+            let mut model = Model { unit: unit.clone(), ..Model::default() };
+            for (m, mold) in paneling.molds.iter().enumerate() {
+                let surface = paneling.mold_surface(set, m).map_err(Failure::other)?;
+                let name = mold_name(m, mold);
+                model.surfaces.push(NamedSurface { name, surface });
+            }
+            exchange::encode_model(path, &model).map_err(|e| Failure::input(path, e))
+        }
+        _ => {
+            let model = Model::of_mesh(panels_mesh(set, paneling), unit.clone());
+            exchange::encode_model(path, &model).map_err(|e| Failure::input(path, e))
+        }
+    }
+}
+
+fn mold_name(m: usize, mold: &Mold) -> String {
+    format!("mold-{m}-{}", mold.kind.name())
+}
+
+fn panels_mesh(set: &PanelSet, paneling: &Paneling) -> Mesh {
+    let mut mesh = Mesh { name: "panels".into(), ..Mesh::default() };
+    mesh.groups =
+        paneling.molds.iter().enumerate().map(|(m, mold)| Group::new(mold_name(m, mold))).collect();
+    for p in 0..set.len() {
+        let panel = paneling.panel_mesh(set, p);
+        let first = mesh.positions.len() as u32;
+        mesh.positions.extend(panel.positions);
+        mesh.normals.extend(panel.normals);
+        for triangle in panel.triangles {
+            mesh.faces.push(&triangle.map(|v| first + v));
+            mesh.face_groups.push(paneling.labels[p] as u32);
+        }
+    }
+    mesh
+}
+
+fn csv(table: &[PanelRow]) -> String {
+    let header = [
+        "panel",
+        "mold",
+        "mold_type",
+        "u",
+        "v",
+        "origin_x",
+        "origin_y",
+        "origin_z",
+        "x_axis_x",
+        "x_axis_y",
+        "x_axis_z",
+        "z_axis_x",
+        "z_axis_y",
+        "z_axis_z",
+        "x_min",
+        "x_max",
+        "y_min",
+        "y_max",
+        "worst_kink_deg",
+        "worst_gap",
+        "deviation",
+    ];
+    let rows = table.iter().map(|row| {
+        let name = row.mold_type.name();
+        let mut cells = vec![row.panel.to_string(), row.mold.to_string(), name.to_owned()];
+        let numbers = row
+            .parameters
+            .iter()
+            .chain(&row.origin)
+            .chain(&row.x_axis)
+            .chain(&row.z_axis)
+            .chain(&row.extent)
+            .chain([&row.worst_kink_deg, &row.worst_gap, &row.deviation]);
+        cells.extend(numbers.map(f64::to_string));
+        cells
+    });
+    exchange::write_csv(&header, rows)
+}
