@@ -255,7 +255,10 @@ fn read_cage(path: &Path, images: &mut [DVec3; 8], freedom: &mut Freedom) -> Res
         0 => {}
         8 => images.iter_mut().zip(file.images).for_each(|(to, p)| *to = p.into()),
         n => {
-            return Err(Failure::input(path, format!("{n} images for 8 corners; give all of them")));
+            return Err(Failure::input(
+                path,
+                format!("{n} images for 8 corners; give all of them"),
+            ));
         }
     }
     Ok(())

@@ -6,8 +6,8 @@ use bspline::BsplineSurface;
 use fixtures::surfaces::{Shape, plane, sphere_cap};
 use geom_core::{DVec3, assert_close};
 use paneling::{
-    Clustering, DiagramAxis, Layout, MoldType, Options, PanelSet, Paneling, PanelingError, Pattern,
-    mold_count, panel,
+    Bounds, Clustering, DiagramAxis, Layout, MoldType, Options, PanelSet, Paneling, PanelingError,
+    Pattern, PriceList, mold_count, panel, panel_within,
 };
 
 fn panels(surface: &BsplineSurface, pattern: Pattern, u: usize, v: usize) -> PanelSet {
@@ -138,4 +138,25 @@ fn bad_options_are_named() {
     let slope_weight = f64::NAN;
     let options = Options { slope_weight, ..Options::with_molds(2) };
     assert!(matches!(panel(&set, &options), Err(PanelingError::BadOption { .. })));
+}
+
+#[test]
+fn bounds_are_kept_or_called_unmet() {
+    let set = roof(10);
+    let options = Options::with_molds(1);
+    let run = |degrees: f64, types: &[MoldType]| {
+        let bounds = Bounds { max_kink: Some(degrees.to_radians()), max_gap: None };
+        panel_within(&set, &bounds, types, &PriceList::counting_molds(), &options).unwrap()
+    };
+    let found = run(1.0, &[MoldType::Cubic]);
+    assert!(found.is_within && found.paneling.measures.kinks.max <= 1.0_f64.to_radians());
+    assert_eq!(found.cost, found.paneling.molds.len() as f64);
+    assert!(found.paneling.molds.len() < 40, "{} molds", found.paneling.molds.len());
+    let several = run(3.0, &[MoldType::Cubic, MoldType::Plane, MoldType::Paraboloid]);
+    assert!(several.is_within);
+    let hopeless = run(1e-6, &[MoldType::Plane]);
+    assert!(!hopeless.is_within && hopeless.worst_excess > 1.0);
+    let bounds = Bounds { max_kink: None, max_gap: Some(-1.0) };
+    let error = panel_within(&set, &bounds, &[], &PriceList::counting_molds(), &options);
+    assert!(matches!(error, Err(PanelingError::BadOption { .. })));
 }
