@@ -9,6 +9,7 @@ mod failure;
 mod net_files;
 mod net_report;
 mod outcome;
+mod panel_files;
 mod report_support;
 
 use clap::Parser;

@@ -92,6 +92,12 @@ impl Outcome {
             .chain(metrics.as_ref())
             .map(|(path, bytes)| (path.as_path(), bytes.as_slice()))
             .collect();
+        for (k, (path, _)) in files.iter().enumerate() {
+            if files[..k].iter().any(|(other, _)| is_same_file(path, other)) {
+                let message = "two results would be written to this file; name another for one";
+                return Err(Failure::usage(format!("{}: {message}", path.display())));
+            }
+        }
         exchange::write_files(&files).map_err(Failure::usage)
     }
 
@@ -99,6 +105,16 @@ impl Outcome {
         let results = if self.status == Status::Interrupted { &[][..] } else { &self.files };
         results.iter().chain(&self.checkpoint)
     }
+}
+
+/// Whether both names lead to one file, which need not exist yet.
+fn is_same_file(a: &Path, b: &Path) -> bool {
+    let place = |path: &Path| {
+        let folder = path.parent().filter(|f| !f.as_os_str().is_empty());
+        let folder = folder.unwrap_or(Path::new(".")).canonicalize().ok();
+        folder.map(|folder| (folder, path.file_name().map(ToOwned::to_owned)))
+    };
+    a.file_name() == b.file_name() && (a == b || place(a).is_some() && place(a) == place(b))
 }
 
 #[derive(Serialize)]

@@ -74,7 +74,56 @@ fn the_page_of_the_demo_is_small_and_repeats() {
         lasting(&page)
     });
     assert!(pages[0] == pages[1]);
-    for part in ["Energies per iteration", "stage-1", "diagram_area"] {
+    let parts = [
+        "Energies per iteration",
+        "Kinks along seams",
+        "Worst seams of panels after",
+        "stage-2",
+        "diagram_area",
+        "panels_before.kink_median_deg",
+    ];
+    for part in parts {
         assert!(pages[0].contains(part), "{part}");
     }
+}
+
+#[test]
+fn the_page_of_panels_shows_molds_kinks_and_seams() {
+    let folder = tempfile::tempdir().unwrap();
+    let [table, page] = ["panels.csv", "page.html"].map(|name| folder.path().join(name));
+    umbilic(&[
+        "panel",
+        "fixtures/saddle.ron",
+        "--panels",
+        "8x8",
+        "-o",
+        table.to_str().unwrap(),
+        "--report",
+        page.to_str().unwrap(),
+        "--figures",
+        folder.path().to_str().unwrap(),
+    ]);
+    let text = fs::read_to_string(&page).unwrap();
+    for part in ["Panels and molds", "Kinks along seams", "Worst seams of panels", "clustering"] {
+        assert!(text.contains(part), "{part}");
+    }
+    let names = files(folder.path());
+    for name in ["histogram-kinks.svg", "histogram-gaps.svg", "panels-molds.png"] {
+        assert!(names.contains_key(name), "{name}");
+    }
+}
+
+#[test]
+fn two_results_in_one_file_are_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("roof.json");
+    let same = folder.path().join(".").join("roof.json");
+    let mut command = Command::new(env!("CARGO_BIN_EXE_umbilic"));
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
+    command.current_dir(root).args(["convert", "fixtures/roof.ron"]).arg(&file);
+    let output = command.arg("--metrics").arg(&same).output().unwrap();
+    let message = String::from_utf8_lossy(&output.stderr);
+    assert_eq!(output.status.code(), Some(2), "{message}");
+    assert!(message.contains("two results") && message.trim().lines().count() == 1, "{message}");
+    assert!(!file.exists());
 }

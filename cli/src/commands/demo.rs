@@ -4,11 +4,16 @@ use crate::args::ReportArgs;
 use crate::commands::weingarten::run;
 use crate::context::Context;
 use crate::failure::Failure;
-use crate::outcome::Outcome;
+use crate::outcome::{Outcome, Status};
+use crate::panel_files::{Quality, encode};
 use crate::report_support;
+use crate::report_support::panels::{gap_histogram, kink_histogram, panel_view, seam_table};
 use crate::report_support::weingarten::weingarten_report;
-use exchange::Model;
-use std::path::PathBuf;
+use bspline::BsplineSurface;
+use exchange::{LengthUnit, Model};
+use paneling::{Clustering, Layout, Options, PanelSet, Paneling, Pattern, mold_count, panel};
+use report::Report;
+use std::path::{Path, PathBuf};
 use std::time::Instant;
 use weingarten::WeingartenOptions;
 
@@ -16,6 +21,21 @@ use weingarten::WeingartenOptions;
 const ROOF: &str = include_str!("../../../fixtures/roof.ron");
 /// Control nets the roof is optimised at, one after the other.
 const LEVELS: [(usize, usize); 4] = [(10, 8), (14, 10), (18, 14), (25, 18)];
+/// Panels in u and v.
+const PANELS: (usize, usize) = (30, 30);
+/// k √N molds for N panels.
+const K: f64 = 3.0;
+/// What is written to the folder; the first two are geometry of the optimised roof, the next three
+/// its panels, their table and the molds.
+const FILES: [&str; 7] = [
+    "surface.step",
+    "surface.glb",
+    "panels.glb",
+    "panels.csv",
+    "molds.step",
+    "report.html",
+    "metrics.json",
+];
 
 /// Arguments of `demo`.
 #[derive(Debug, clap::Args)]
@@ -32,11 +52,11 @@ impl Demo {
         std::fs::create_dir_all(&self.folder).map_err(|e| {
             Failure::input(&self.folder, format!("the folder cannot be made: {e}; name another"))
         })?;
-        let paths = ["surface.step", "surface.glb", "metrics.json", "report.html"]
-            .map(|n| self.folder.join(n));
+        let paths = FILES.map(|n| self.folder.join(n));
         for path in &paths {
             crate::args::check_output_path(path)?;
         }
+        let [step, glb, panels_glb, panels_csv, molds, page, metrics] = &paths;
         let model = exchange::read_scene(ROOF).map_err(Failure::other)?;
         let Some(named) = model.surfaces.first() else {
             return Err(Failure::other("the built-in roof has no surface"));
@@ -44,23 +64,117 @@ impl Demo {
         let options = WeingartenOptions { levels: LEVELS.to_vec(), ..Default::default() };
         let run = run(&named.surface, &options, None, context).map_err(Failure::other)?;
         let mut outcome = run.outcome(&model.unit)?;
+        if outcome.status == Status::Interrupted {
+            return Ok(outcome);
+        }
+        let cut = Panelings::new(&named.surface, &run.optimized.surface)?;
+        cut.measure(&mut outcome)?;
+        let head = "a roof of 14 x 14 control points, made a Weingarten surface at four levels:";
+        outcome.summary.insert(0, head.to_owned());
+        outcome.summary.extend(cut.summary());
+
         let unit = model.unit.to_string();
-        let report = weingarten_report(&named.surface, &run.optimized, &options, &unit)?;
-        let result = Model::of_surface("roof", run.optimized.surface, model.unit);
-        for path in &paths[..2] {
+        let mut report = weingarten_report(&named.surface, &run.optimized, &options, &unit)?;
+        cut.describe(&mut report)?;
+        let result = Model::of_surface("roof", run.optimized.surface, model.unit.clone());
+        for path in [step, glb] {
             let bytes =
                 exchange::encode_model(path, &result).map_err(|e| Failure::input(path, e))?;
             outcome.files.push((path.clone(), bytes));
         }
-        let page = ReportArgs { report: Some(paths[3].clone()), figures: None };
-        report_support::add_files(&mut outcome, &page, context, report)?;
+        for path in [panels_glb, panels_csv, molds] {
+            outcome.files.push((path.clone(), cut.encode(path, &model.unit)?));
+        }
+        let pages = ReportArgs { report: Some(page.clone()), figures: None };
+        report_support::add_files(&mut outcome, &pages, context, report)?;
         let seconds = begin.elapsed().as_secs_f64();
-        let metrics = outcome.metrics_file("demo", seconds, context.threads);
-        outcome.files.push((paths[2].clone(), metrics));
-        let head = "a roof of 14 x 14 control points, made a Weingarten surface at four levels:";
-        outcome.summary.insert(0, head.to_owned());
+        let file = outcome.metrics_file("demo", seconds, context.threads);
+        outcome.files.push((metrics.clone(), file));
         let written: Vec<String> = paths.iter().map(|p| p.display().to_string()).collect();
         outcome.summary.push(format!("written: {}", written.join(", ")));
         Ok(outcome)
     }
+}
+
+/// The roof cut into panels before and after its optimisation.
+struct Panelings {
+    before: (PanelSet, Paneling),
+    /// Assigned by cost on the roof before.
+    cost_driven: Paneling,
+    after: (PanelSet, Paneling),
+}
+
+impl Panelings {
+    fn new(before: &BsplineSurface, after: &BsplineSurface) -> Result<Self, Failure> {
+        let layout = Layout::generate(Pattern::Quad, PANELS.0, PANELS.1, [false, false])
+            .map_err(Failure::other)?;
+        let options = Options::with_molds(mold_count(K, layout.len()));
+        let by_cost = Options { clustering: Clustering::Cover, ..options.clone() };
+        let cut = |surface| {
+            let set = PanelSet::new(surface, &layout)?;
+            let paneling = panel(&set, &options)?;
+            Ok((set, paneling))
+        };
+        let (before, after) = rayon::join(|| cut(before), || cut(after));
+        let (before, after) = (before.map_err(failed)?, after.map_err(failed)?);
+        let cost_driven = panel(&before.0, &by_cost).map_err(failed)?;
+        Ok(Self { before, cost_driven, after })
+    }
+
+    /// Name, panels and paneling of each, in the order they are shown.
+    fn all(&self) -> [(&'static str, &PanelSet, &Paneling); 3] {
+        [
+            ("before", &self.before.0, &self.before.1),
+            ("before, by cost", &self.before.0, &self.cost_driven),
+            ("after", &self.after.0, &self.after.1),
+        ]
+    }
+
+    fn measure(&self, outcome: &mut Outcome) -> Result<(), Failure> {
+        let keys = ["panels_before", "panels_before_cost_driven", "panels_after"];
+        for (key, (_, set, paneling)) in keys.into_iter().zip(self.all()) {
+            let quality = Quality::new(set, paneling);
+            outcome.metrics[key] = serde_json::to_value(quality).map_err(Failure::other)?;
+        }
+        Ok(())
+    }
+
+    fn summary(&self) -> Vec<String> {
+        let [before, by_cost, after] = self.all().map(|(_, s, p)| Quality::new(s, p));
+        let kinks = |q: &Quality| {
+            let Quality { kink_median_deg: median, kink_p95_deg: most, .. } = q;
+            format!("half of the kinks below {median:.3}°, 95 % below {most:.3}°")
+        };
+        vec![
+            format!("{} panels on {} molds each time:", after.panels, after.molds),
+            format!("  before               {}", kinks(&before)),
+            format!("  before, by cost      {}", kinks(&by_cost)),
+            format!("  after                {}", kinks(&after)),
+        ]
+    }
+
+    /// Adds the panels, the histograms and the worst seams to the page.
+    fn describe(&self, report: &mut Report) -> Result<(), Failure> {
+        let unit = report.length_unit.clone();
+        let (set, paneling) = &self.after;
+        report.title = "A roof made a Weingarten surface and cut into panels".to_owned();
+        report.stages.push(panel_view("panels after", set, paneling, &unit)?);
+        let series = self.all().map(|(name, _, paneling)| (name, paneling));
+        report.histograms.push(kink_histogram(&series, None));
+        report.histograms.push(gap_histogram(&series, None, &unit));
+        report.seams = Some(seam_table("panels after", set, paneling, [None, None], &unit));
+        report.option("panels", format!("{}x{}", PANELS.0, PANELS.1));
+        report.option("molds", paneling.molds.len());
+        Ok(())
+    }
+
+    fn encode(&self, path: &Path, unit: &LengthUnit) -> Result<Vec<u8>, Failure> {
+        let (set, paneling) = &self.after;
+        encode(path, set, paneling, &paneling.table(set), unit)
+    }
+}
+
+/// The built-in roof can always be cut; if not, the slip is ours.
+fn failed(error: paneling::PanelingError) -> Failure {
+    Failure::other(format!("the built-in roof cannot be cut into panels: {error}"))
 }

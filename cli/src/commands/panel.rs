@@ -1,16 +1,20 @@
 //! `umbilic panel SURFACE -o OUT`.
 
-use crate::args::{ConfigArgs, ConvergedArgs, Counts, check_output_path};
+use crate::args::{ConfigArgs, ConvergedArgs, Counts, ReportArgs, check_output_path};
 use crate::context::Context;
 use crate::failure::Failure;
 use crate::layered;
 use crate::outcome::{Outcome, Status};
+use crate::panel_files::{Quality, encode};
+use crate::report_support;
+use crate::report_support::panels::paneling_report;
 use bspline::BsplineSurface;
-use exchange::{Group, LengthUnit, Mesh, Model, NamedSurface};
+use exchange::LengthUnit;
 use paneling::{
-    Bounded, Bounds, Clustering, DiagramAxis, Layout, Mold, MoldType, Options, PanelRow, PanelSet,
-    Paneling, Pattern, PriceList, mold_count, panel, panel_within,
+    Bounded, Bounds, Clustering, DiagramAxis, Layout, MoldType, Options, PanelSet, Paneling,
+    Pattern, PriceList, mold_count, panel, panel_within,
 };
+use report::Report;
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
 
@@ -31,6 +35,8 @@ pub(crate) struct Panel {
     config: ConfigArgs,
     #[command(flatten)]
     converged: ConvergedArgs,
+    #[command(flatten)]
+    report: ReportArgs,
 }
 
 /// Options that may also stand in the configuration file.
@@ -116,6 +122,23 @@ impl PanelOptions {
         })
     }
 
+    /// The options in force, for the report.
+    fn list(&self, report: &mut Report, paneling: &Paneling) {
+        report.option("panels", paneling.labels.len());
+        report.option("molds", paneling.molds.len());
+        report.option("layout", self.layout.as_deref().unwrap_or("quad"));
+        report.option("equal arc length", self.equal_arc_length.unwrap_or(false));
+        report.option("clustering", self.clustering.as_deref().unwrap_or("own"));
+        if let Some(kink) = self.max_kink_deg {
+            report.option("largest kink", format!("{kink}°"));
+        }
+        if let Some(gap) = self.max_gap {
+            report.option("largest gap", format!("{gap} {}", report.length_unit).trim_end());
+        }
+        let types = self.mold_types.as_deref().unwrap_or(&[MoldType::Cubic]);
+        report.option("mold types", types.iter().map(|t| t.name()).collect::<Vec<_>>().join(", "));
+    }
+
     fn clustering(&self) -> Result<Clustering, Failure> {
         match self.clustering.as_deref() {
             None | Some("own") => Ok(Clustering::Own),
@@ -161,8 +184,9 @@ fn layout_file(path: &Path) -> Result<Layout, Failure> {
 }
 
 impl Panel {
-    pub(crate) fn run(self, _context: &Context) -> Result<Outcome, Failure> {
+    pub(crate) fn run(self, context: &Context) -> Result<Outcome, Failure> {
         self.check_outputs()?;
+        self.report.check()?;
         let mut config: PanelOptions = self.config.load()?;
         if self.options.rule()?.is_some() {
             // A rule on the command line replaces whatever rule the file has.
@@ -194,6 +218,12 @@ impl Panel {
         for path in self.output {
             let bytes = encode(&path, &set, paneling, &table, &unit)?;
             outcome.files.push((path, bytes));
+        }
+        if self.report.wanted() {
+            let bounds = [options.max_kink_deg, options.max_gap];
+            let mut report = paneling_report(&set, paneling, bounds, &unit.to_string())?;
+            options.list(&mut report, paneling);
+            report_support::add_files(&mut outcome, &self.report, context, report)?;
         }
         Ok(outcome)
     }
@@ -312,44 +342,6 @@ struct PanelMetrics {
     grid: Option<Quality>,
 }
 
-/// How well the panels of one paneling meet.
-#[derive(Serialize)]
-struct Quality {
-    panels: usize,
-    molds: usize,
-    kink_median_deg: f64,
-    kink_p95_deg: f64,
-    kink_max_deg: f64,
-    gap_median: f64,
-    gap_p95: f64,
-    gap_max: f64,
-    gap_median_percent: f64,
-    gap_p95_percent: f64,
-    gap_max_percent: f64,
-    deviation_max_percent: f64,
-}
-
-impl Quality {
-    fn new(set: &PanelSet, paneling: &Paneling) -> Self {
-        let (kinks, gaps) = (paneling.measures.kinks, paneling.measures.gaps);
-        let percent = |length: f64| set.percent_of_diagonal(length);
-        Self {
-            panels: set.len(),
-            molds: paneling.molds.len(),
-            kink_median_deg: kinks.median.to_degrees(),
-            kink_p95_deg: kinks.p95.to_degrees(),
-            kink_max_deg: kinks.max.to_degrees(),
-            gap_median: gaps.median,
-            gap_p95: gaps.p95,
-            gap_max: gaps.max,
-            gap_median_percent: percent(gaps.median),
-            gap_p95_percent: percent(gaps.p95),
-            gap_max_percent: percent(gaps.max),
-            deviation_max_percent: percent(paneling.measures.max_deviation()),
-        }
-    }
-}
-
 fn summary(set: &PanelSet, result: &Solved, unit: &LengthUnit) -> Vec<String> {
     let paneling = &result.bounded.paneling;
     let quality = Quality::new(set, paneling);
@@ -387,102 +379,4 @@ fn summary(set: &PanelSet, result: &Solved, unit: &LengthUnit) -> Vec<String> {
         lines.push(format!("  worst seam: panels {a} and {b}, kink {kink:.4}°"));
     }
     lines
-}
-
-/// The RON form of a paneling.
-#[derive(Serialize)]
-struct PanelingFile<'a> {
-    molds: &'a [Mold],
-    panels: &'a [PanelRow],
-}
-
-fn encode(
-    path: &Path,
-    set: &PanelSet,
-    paneling: &Paneling,
-    table: &[PanelRow],
-    unit: &LengthUnit,
-) -> Result<Vec<u8>, Failure> {
-    match exchange::extension_of(path).as_str() {
-        "csv" => Ok(csv(table).into_bytes()),
-        "ron" => {
-            let file = PanelingFile { molds: &paneling.molds, panels: table };
-            exchange::to_ron(&file).map(String::into_bytes).map_err(Failure::other)
-        }
-        "step" | "stp" => {
-            let mut model = Model { unit: unit.clone(), ..Model::default() };
-            for (m, mold) in paneling.molds.iter().enumerate() {
-                let surface = paneling.mold_surface(set, m).map_err(Failure::other)?;
-                let name = mold_name(m, mold);
-                model.surfaces.push(NamedSurface { name, surface });
-            }
-            exchange::encode_model(path, &model).map_err(|e| Failure::input(path, e))
-        }
-        _ => {
-            let model = Model::of_mesh(panels_mesh(set, paneling), unit.clone());
-            exchange::encode_model(path, &model).map_err(|e| Failure::input(path, e))
-        }
-    }
-}
-
-fn mold_name(m: usize, mold: &Mold) -> String {
-    format!("mold-{m}-{}", mold.kind.name())
-}
-
-fn panels_mesh(set: &PanelSet, paneling: &Paneling) -> Mesh {
-    let mut mesh = Mesh { name: "panels".into(), ..Mesh::default() };
-    mesh.groups =
-        paneling.molds.iter().enumerate().map(|(m, mold)| Group::new(mold_name(m, mold))).collect();
-    for p in 0..set.len() {
-        let panel = paneling.panel_mesh(set, p);
-        let first = mesh.positions.len() as u32;
-        mesh.positions.extend(panel.positions);
-        mesh.normals.extend(panel.normals);
-        for triangle in panel.triangles {
-            mesh.faces.push(&triangle.map(|v| first + v));
-            mesh.face_groups.push(paneling.labels[p] as u32);
-        }
-    }
-    mesh
-}
-
-fn csv(table: &[PanelRow]) -> String {
-    let header = [
-        "panel",
-        "mold",
-        "mold_type",
-        "u",
-        "v",
-        "origin_x",
-        "origin_y",
-        "origin_z",
-        "x_axis_x",
-        "x_axis_y",
-        "x_axis_z",
-        "z_axis_x",
-        "z_axis_y",
-        "z_axis_z",
-        "x_min",
-        "x_max",
-        "y_min",
-        "y_max",
-        "worst_kink_deg",
-        "worst_gap",
-        "deviation",
-    ];
-    let rows = table.iter().map(|row| {
-        let name = row.mold_type.name();
-        let mut cells = vec![row.panel.to_string(), row.mold.to_string(), name.to_owned()];
-        let numbers = row
-            .parameters
-            .iter()
-            .chain(&row.origin)
-            .chain(&row.x_axis)
-            .chain(&row.z_axis)
-            .chain(&row.extent)
-            .chain([&row.worst_kink_deg, &row.worst_gap, &row.deviation]);
-        cells.extend(numbers.map(f64::to_string));
-        cells
-    });
-    exchange::write_csv(&header, rows)
 }

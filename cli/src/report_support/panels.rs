@@ -4,7 +4,8 @@ use super::refused;
 use crate::failure::Failure;
 use paneling::{PanelSet, Paneling};
 use report::{
-    FaceGroups, Histogram, LineRole, LineSet, ScalarField, Seam, SeamTable, Series, SurfaceView,
+    FaceGroups, Histogram, LineRole, LineSet, Report, ScalarField, Seam, SeamTable, Series,
+    SurfaceView,
 };
 
 /// Rows of the seam table.
@@ -73,6 +74,23 @@ pub(crate) fn panel_view(
         .and_then(|v| v.with_field(deviation))
         .and_then(|v| v.with_lines(seams))
         .map_err(refused)
+}
+
+/// The page of one paneling: the panels on their molds, kinks, gaps and the worst seams. `bounds` as
+/// of [`seam_table`].
+pub(crate) fn paneling_report(
+    set: &PanelSet,
+    paneling: &Paneling,
+    bounds: [Option<f64>; 2],
+    length_unit: &str,
+) -> Result<Report, Failure> {
+    let mut report = super::new("Panels and molds");
+    report.length_unit = length_unit.to_owned();
+    report.stages.push(panel_view("panels", set, paneling, length_unit)?);
+    report.histograms.push(kink_histogram(&[("panels", paneling)], bounds[0]));
+    report.histograms.push(gap_histogram(&[("panels", paneling)], bounds[1], length_unit));
+    report.seams = Some(seam_table("panels", set, paneling, bounds, length_unit));
+    Ok(report)
 }
 
 /// Kinks of several panelings at all samples of all seams, in degrees.
