@@ -1,0 +1,114 @@
+//! `umbilic fair` from the outside: files, metrics, exit codes, messages.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output};
+
+const THETA: &str = "fixtures/quads/theta.obj";
+
+fn umbilic(args: &[&str]) -> Output {
+    Command::new(env!("CARGO_BIN_EXE_umbilic"))
+        .current_dir(Path::new(env!("CARGO_MANIFEST_DIR")).join(".."))
+        .args(args)
+        .output()
+        .expect("the program starts")
+}
+
+/// A refusal: exit code 2, a message with these words, nothing written.
+fn refused(args: &[&str], words: &[&str]) {
+    let folder = tempfile::tempdir().expect("a folder");
+    let out = folder.path().join("out.obj").display().to_string();
+    let mut all = vec!["fair"];
+    all.extend(args);
+    all.extend(["-o", &out]);
+    let result = umbilic(&all);
+    let message = String::from_utf8_lossy(&result.stderr).into_owned();
+    assert_eq!(result.status.code(), Some(2), "{args:?}: {message}");
+    for word in words {
+        assert!(message.contains(word), "{args:?}: {message} lacks {word}");
+    }
+    assert!(!message.contains("panicked"), "{message}");
+    assert_eq!(fs::read_dir(folder.path()).expect("a folder").count(), 0, "{args:?}");
+}
+
+fn written(folder: &Path, name: &str, content: &str) -> String {
+    let path: PathBuf = folder.join(name);
+    fs::write(&path, content).expect("a file");
+    path.display().to_string()
+}
+
+#[test]
+fn a_mesh_is_faired_into_every_format_with_metrics() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = |name: &str| folder.path().join(name).display().to_string();
+    let (obj, step, glb, json) = (path("a.obj"), path("a.step"), path("a.glb"), path("a.json"));
+    let html = path("a.html");
+    let result = umbilic(&[
+        "fair",
+        THETA,
+        "-o",
+        &obj,
+        "-o",
+        &step,
+        "-o",
+        &glb,
+        "--levels",
+        "1",
+        "--iterations",
+        "3",
+        "--metrics",
+        &json,
+        "--report",
+        &html,
+    ]);
+    assert!(result.status.success(), "{}", String::from_utf8_lossy(&result.stderr));
+    for file in [&obj, &step, &glb, &html] {
+        assert!(fs::metadata(file).expect("a file").len() > 1000, "{file}");
+    }
+    let text = fs::read_to_string(&json).expect("a metrics file");
+    let m: serde_json::Value = serde_json::from_str(&text).expect("JSON");
+    assert_eq!((&m["schema"], &m["command"]), (&1.into(), &"fair".into()));
+    assert_eq!((&m["status"], &m["iterations"]), (&"iteration_limit".into(), &6.into()));
+    let number = |key: &str| m["metrics"][key].as_f64().expect(key);
+    assert!(number("energy_final") < number("energy_initial"));
+    assert!(number("gauss_bonnet_residual") < 1e-3);
+    let energies = m["metrics"]["energies"].as_object().expect("energies");
+    assert!(energies["mehlum_tarrou"].is_f64() && energies["bending"].is_f64(), "{text}");
+}
+
+#[test]
+fn bad_expressions_are_refused_with_their_position() {
+    refused(&[THETA, "--energy", "bending +"], &["position"]);
+    refused(&[THETA, "--energy", "bending + bendng"], &["position 10", "bendng"]);
+    refused(&[THETA, "--energy", "0*bending"], &["energy"]);
+    refused(&[THETA, "--energy", "area"], &["area", "size"]);
+}
+
+#[test]
+fn bad_meshes_are_refused() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let obj = |name: &str, text: &str| written(folder.path(), name, text);
+    let triangles =
+        obj("t.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 1 4 3\n");
+    refused(&[&triangles], &["triangles"]);
+    let fan = "v 0 0 0\nv 0 0 1\nv 1 0 0\nv 1 0 1\nv 0 1 0\nv 0 1 1\nv -1 0 0\nv -1 0 1\n";
+    let fan = obj("fan.obj", &format!("{fan}f 1 2 4 3\nf 2 1 5 6\nf 1 2 8 7\n"));
+    refused(&[&fan], &["edge"]);
+    let points = obj("p.obj", "v 0 0 0\nv 1 0 0\nv 1 1 0\n");
+    refused(&[&points], &["no mesh"]);
+    let flat = "v 0 0 0\nv 0 0 0\nv 0 0 0\nv 0 0 0\nf 1 2 3 4\n";
+    refused(&[&obj("point.obj", flat)], &[]);
+    refused(&["no-such-file.obj"], &["no-such-file.obj"]);
+}
+
+#[test]
+fn bad_options_are_refused() {
+    let folder = tempfile::tempdir().expect("a folder");
+    refused(&[THETA, "--levels", "14"], &["levels"]);
+    let beyond = written(folder.path(), "a.ron", "(vertices: [99999])");
+    refused(&[THETA, "--fix", &beyond], &["99999"]);
+    let unknown = written(folder.path(), "b.ron", "(vertexes: [1])");
+    refused(&[THETA, "--fix", &unknown], &["vertexes"]);
+    refused(&[THETA, "--symmetry", "no-such-file.ron"], &["no-such-file.ron"]);
+    refused(&[THETA, "--method", "magic"], &["magic"]);
+}
