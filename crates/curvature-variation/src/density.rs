@@ -275,7 +275,10 @@ impl<S: Simd> Shape<S> {
             let half = (l - q) * 0.5;
             let cos = half.fma(half, -twist);
             let sin = half * m * 2.0;
-            let size = half.fma(half, twist) + (bending + twist * 2.0) * GUARD;
+            // The last summand keeps a flat point, where all vanishes, from dividing by zero.
+            let size = half.fma(half, twist)
+                + (bending + twist * 2.0) * GUARD
+                + Lanes::splat(simd, 1e-200);
             let scale = size.recip() * w.coupling;
             let zr = f1c.fma(f3c, -(f1s * f3s));
             let zi = -(f1c.fma(f3s, f1s * f3c));

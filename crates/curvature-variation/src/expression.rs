@@ -5,7 +5,7 @@ use std::str::FromStr;
 
 /// Why a text is not an energy; positions count characters from 0.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("energy expression, position {position}: {message}\n  {text}\n  {marker}^", marker = " ".repeat(*position))]
+#[error("energy expression, position {position}: {message}, in '{text}'")]
 pub struct ExpressionError {
     /// The whole text.
     pub text: String,

@@ -74,7 +74,7 @@ impl Default for FairOptions {
 #[expect(missing_docs, reason = "the messages spell out every field")]
 pub enum FairError {
     #[error(
-        "all {faces} faces are triangles; turn the mesh into quads first (umbilic remesh), or start from a coarse quad mesh of the same topology"
+        "all {faces} faces are triangles; turn the mesh into quads first, or start from a coarse quad mesh of the same topology"
     )]
     Triangles { faces: usize },
     #[error("vertex {vertex} belongs to no face; remove it")]
@@ -94,6 +94,10 @@ pub enum FairError {
     #[error("the energy is not finite at the start; the control mesh has folds or collapsed faces")]
     Singular,
     #[error(
+        "{energy} has no minimum: it fell to {value:.1e} and the surface tore; raise the negative weights"
+    )]
+    Unbounded { energy: String, value: f64 },
+    #[error(
         "--levels {levels} would make about {vertices} vertices; at most {limit} are supported"
     )]
     TooManyLevels { levels: usize, vertices: usize, limit: usize },
@@ -107,6 +111,8 @@ pub enum FairError {
 
 /// Vertices a level may have.
 const MAX_VERTICES: usize = 400_000;
+/// How many times the initial energy below zero an energy counts as having no minimum.
+const UNBOUNDED: f64 = 1e6;
 /// Gauss-Newton steps that open a level: the first, and the later ones.
 const FIRST_NEWTON_STEPS: usize = 25;
 const LATER_NEWTON_STEPS: usize = 4;
@@ -277,7 +283,8 @@ pub fn fair(
     let coarse = energies(&mesh, &surface, constraints, options.quadrature);
     let after = energies(&mesh, &surface, constraints, Quadrature::FINE);
     let energy_final = after.total(&options.energy);
-    let gap = (coarse.total(&options.energy) / energy_final - 1.0).abs();
+    let difference = (coarse.total(&options.energy) - energy_final).abs();
+    let gap = if difference == 0.0 { 0.0 } else { difference / energy_final.abs() };
     let last = levels.last().ok_or(FairError::NoEnergy)?;
     let extrapolated = match &levels[..] {
         [.., a, b] if !interrupted => Some(energy_final - (a.final_energy - b.final_energy) / 3.0),
@@ -418,6 +425,12 @@ fn minimise_level(
         freedom.expand(&state.y, &mut state.x);
     }
     let final_energy = evaluator.energy(&options.energy, &state.x, &mut state.work);
+    // The functionals but `gaussian` and `mean_curvature` are at least zero, so that only negative
+    // weights reach down here.
+    if final_energy.is_nan() || final_energy < -UNBOUNDED * (1.0 + initial_energy.abs()) {
+        let energy = options.energy.to_string();
+        return Err(FairError::Unbounded { energy, value: final_energy });
+    }
     mesh.positions_mut().copy_from_slice(&unflatten(&state.x));
     let report = LevelReport {
         vertices: mesh.vertex_count(),

@@ -1,0 +1,141 @@
+//! Fairing from raw inputs: known minimisers, constraints, refusals.
+
+use curvature_variation::{
+    Constraints, FairError, FairOptions, Fairing, Functional, Method, SymmetryMode, fair,
+};
+use fixtures::quad_graphs;
+use geom_core::{DVec3, PolyMesh};
+use std::f64::consts::PI;
+use std::ops::ControlFlow;
+use subdiv_catmull_clark::{Creases, limit_frames};
+
+fn options(energy: &str, levels: usize) -> FairOptions {
+    FairOptions { energy: energy.parse().expect("an energy"), levels, ..FairOptions::default() }
+}
+
+fn run(mesh: &PolyMesh, constraints: &Constraints, options: &FairOptions) -> Fairing {
+    fair(mesh, &Creases::none(), constraints, options, |_| ControlFlow::Continue(()))
+        .expect("a surface that can be faired")
+}
+
+fn refusal(mesh: &PolyMesh, constraints: &Constraints, options: &FairOptions) -> FairError {
+    fair(mesh, &Creases::none(), constraints, options, |_| ControlFlow::Continue(()))
+        .expect_err("a refusal")
+}
+
+#[test]
+fn an_ellipsoid_becomes_a_sphere() {
+    let mesh = quad_graphs::ellipsoid(4, DVec3::new(1.0, 1.2, 1.6));
+    let result = run(&mesh, &Constraints::default(), &options("f3 + f1", 1));
+    let table = &result.report.after;
+    assert!((table.get(Functional::Bending) / (8.0 * PI) - 1.0).abs() < 1e-3);
+    assert!(result.report.gauss_bonnet_residual < 2e-4);
+}
+
+#[test]
+fn bending_minimiser_of_genus_one_is_the_clifford_torus() {
+    let mesh = quad_graphs::torus(16, 8, 1.0, 0.4);
+    let result = run(&mesh, &Constraints::default(), &options("bending", 1));
+    assert!((result.report.energy_final / (8.0 * PI * PI) - 1.0).abs() < 2e-4);
+    let frames = limit_frames(&result.mesh, &result.surface);
+    let points: Vec<f64> = frames
+        .iter()
+        .flatten()
+        .map(|f| f.point(result.mesh.positions()))
+        .map(|p| p.x.hypot(p.y))
+        .collect();
+    let (mut inner, mut outer) = (f64::INFINITY, 0.0_f64);
+    for r in points {
+        inner = inner.min(r);
+        outer = outer.max(r);
+    }
+    let ratio = (outer - inner) / (outer + inner);
+    assert!((ratio - std::f64::consts::FRAC_1_SQRT_2).abs() < 2e-3, "{ratio}");
+}
+
+#[test]
+fn genus_two_reaches_the_published_energy_on_a_coarse_mesh() {
+    let result =
+        run(&quad_graphs::theta_graph(3), &Constraints::default(), &FairOptions::default());
+    assert_eq!(result.mesh.vertex_count(), 382);
+    assert!(result.report.energy_final < 1903.0, "{}", result.report.energy_final);
+    assert!(result.report.quadrature_gap < 3e-3);
+    assert!(result.report.gauss_bonnet_residual < 2e-4);
+}
+
+#[test]
+fn methods_and_symmetry_agree_on_the_minimum() {
+    let mesh = quad_graphs::theta_graph(3);
+    let base = options("bending", 1);
+    let reference = run(&mesh, &Constraints::default(), &base).report.energy_final;
+    for method in [Method::GaussNewton, Method::Sobolev] {
+        let options = FairOptions { method, iterations: 300, ..base.clone() };
+        let got = run(&mesh, &Constraints::default(), &options).report.energy_final;
+        assert!((got / reference - 1.0).abs() < 2e-3, "{method:?}: {got} against {reference}");
+    }
+    let free = FairOptions { symmetry: SymmetryMode::None, ..base };
+    let got = run(&mesh, &Constraints::default(), &free).report.energy_final;
+    // Without the symmetry there are more unknowns, never a higher minimum.
+    assert!(got < reference * (1.0 + 1e-3), "{got} against {reference}");
+}
+
+#[test]
+fn clamped_boundaries_stay() {
+    let mesh = quad_graphs::lamp_shade(8);
+    let constraints = Constraints { clamp_boundary: true, ..Constraints::default() };
+    let result = run(&mesh, &constraints, &options("bending", 0));
+    assert!(result.report.energy_final < result.report.energy_initial);
+    let rows = mesh.vertex_count() / 8;
+    for (v, (p, q)) in mesh.positions().iter().zip(result.mesh.positions()).enumerate() {
+        if v % rows < 3 || v % rows >= rows - 3 {
+            assert!(p.distance(*q) < 1e-12, "vertex {v}");
+        }
+    }
+}
+
+#[test]
+fn pinned_limit_points_and_tangent_planes_are_met() {
+    let mesh = quad_graphs::ellipsoid(3, DVec3::new(1.0, 1.2, 1.4));
+    let constraints = Constraints {
+        limit_points: vec![(0, Some([-1.0, -1.0, -1.0])), (7, None)],
+        tangent_planes: vec![(0, Some([-1.0, -1.0, -1.5]))],
+        ..Constraints::default()
+    };
+    let result = run(&mesh, &constraints, &options("bending", 1));
+    let frames = limit_frames(&result.mesh, &result.surface);
+    let frame = frames[0].as_ref().expect("a used vertex");
+    let positions = result.mesh.positions();
+    assert!(frame.point(positions).distance(DVec3::splat(-1.0)) < 1e-8);
+    let want = DVec3::new(-1.0, -1.0, -1.5).normalize();
+    assert!(frame.normal(positions).dot(want).abs() > 1.0 - 1e-10);
+}
+
+#[test]
+fn refusals_say_what_and_how_to_mend() {
+    let mesh = quad_graphs::theta_graph(3);
+    let none = Constraints::default();
+    let error = refusal(&mesh, &none, &options("area", 0));
+    assert!(error.to_string().starts_with("area changes with the size"), "{error}");
+    let error = refusal(&mesh, &none, &options("0*bending", 0));
+    assert_eq!(error, FairError::NoEnergy);
+    let all = Constraints {
+        vertices: (0..mesh.vertex_count() as u32).collect(),
+        ..Constraints::default()
+    };
+    assert!(matches!(refusal(&mesh, &all, &options("bending", 0)), FairError::NothingFree { .. }));
+    let beyond = Constraints { vertices: vec![999], ..Constraints::default() };
+    assert!(matches!(
+        refusal(&mesh, &beyond, &options("bending", 0)),
+        FairError::NoSuchVertex { vertex: 999, .. }
+    ));
+    let triangle =
+        PolyMesh::new(vec![DVec3::X, DVec3::Y, DVec3::Z], &[[0, 1, 2]]).expect("a triangle");
+    assert!(matches!(
+        refusal(&triangle, &none, &options("bending", 0)),
+        FairError::Triangles { faces: 1 }
+    ));
+    assert!(matches!(
+        refusal(&mesh, &none, &options("bending", 12)),
+        FairError::TooManyLevels { .. }
+    ));
+}
