@@ -39,10 +39,8 @@ pub(crate) fn panel_view(
     let spread = |of: &dyn Fn(usize) -> f64| -> Vec<f64> {
         panel_of_vertex.iter().map(|&p| of(p)).collect()
     };
-    let mut h = ScalarField::mean_curvature(spread(&|p| set.curvatures()[p][0]), length_unit);
-    h.label += " of the design";
-    let mut k = ScalarField::gaussian_curvature(spread(&|p| set.curvatures()[p][1]), length_unit);
-    k.label += " of the design";
+    let h = ScalarField::mean_curvature(spread(&|p| set.curvatures()[p][0]), length_unit);
+    let k = ScalarField::gaussian_curvature(spread(&|p| set.curvatures()[p][1]), length_unit);
     let kink = spread(&|p| worst[p][0].to_degrees());
     let kink = ScalarField::magnitude("kink", "worst kink of a panel", "°", kink);
     let gap = spread(&|p| worst[p][1]);
@@ -63,12 +61,13 @@ pub(crate) fn panel_view(
         let border = set.border(p);
         border.iter().chain(border.first()).copied().collect()
     });
-    let seams = LineSet::new("seams", "seams of the design", LineRole::Mesh, borders.collect());
+    let mut seams = LineSet::new("seams", "seams of the design", LineRole::Mesh, borders.collect());
+    seams.visible = true;
     SurfaceView::new(name, positions, normals, triangles)
         .and_then(|v| v.with_groups(molds))
         .and_then(|v| v.with_groups(FaceGroups::numbered("panels", "panel", of_panel)))
-        .and_then(|v| v.with_field(h))
         .and_then(|v| v.with_field(k))
+        .and_then(|v| v.with_field(h))
         .and_then(|v| v.with_field(kink))
         .and_then(|v| v.with_field(gap))
         .and_then(|v| v.with_field(deviation))
