@@ -361,15 +361,17 @@ mod tests {
             w in prop::array::uniform4(0.3..3.0_f64),
         ) {
             let patch = BilinearPatch::new(skew(), w).unwrap();
-            let (jet, h) = (patch.jet(u, v), 1e-5);
+            let (jet, h) = (patch.jet(u, v), 1e-6);
             let du = (patch.point(u + h, v) - patch.point(u - h, v)) / (2.0 * h);
             let dv = (patch.point(u, v + h) - patch.point(u, v - h)) / (2.0 * h);
-            prop_assert!(jet.du.distance(du) < 1e-8 && jet.dv.distance(dv) < 1e-8);
+            // Uneven weights make third derivatives of some thousands, hence the relative bound.
+            prop_assert!(jet.du.distance(du) < 1e-8 * (1.0 + du.length()));
+            prop_assert!(jet.dv.distance(dv) < 1e-8 * (1.0 + dv.length()));
             let (up, down) = (patch.jet(u + h, v), patch.jet(u - h, v));
-            prop_assert!(jet.duu.distance((up.du - down.du) / (2.0 * h)) < 1e-7);
-            prop_assert!(jet.duv.distance((up.dv - down.dv) / (2.0 * h)) < 1e-7);
+            prop_assert!(jet.duu.distance((up.du - down.du) / (2.0 * h)) < 1e-7 * (1.0 + jet.duu.length()));
+            prop_assert!(jet.duv.distance((up.dv - down.dv) / (2.0 * h)) < 1e-7 * (1.0 + jet.duv.length()));
             let (up, down) = (patch.jet(u, v + h), patch.jet(u, v - h));
-            prop_assert!(jet.dvv.distance((up.dv - down.dv) / (2.0 * h)) < 1e-7);
+            prop_assert!(jet.dvv.distance((up.dv - down.dv) / (2.0 * h)) < 1e-7 * (1.0 + jet.dvv.length()));
         }
 
         #[test]
