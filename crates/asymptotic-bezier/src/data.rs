@@ -178,7 +178,7 @@ pub struct NetFace {
 
 /// A net of asymptotic curves: vertices, curves along its edges, quadrilateral faces.
 ///
-/// Built by [`AsymptoticNet::from_quads`] or out of [`CornerData`]; the constructors check the
+/// Built from a quad mesh or out of [`CornerData`]; the constructors check the
 /// incidence, so that every face closes and every curve has its two vertices.
 #[derive(Clone, Debug, PartialEq)]
 pub struct AsymptoticNet {
