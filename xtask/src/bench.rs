@@ -27,8 +27,9 @@ pub(crate) fn run(packages: &[&str]) -> Outcome {
 
 /// Runs the solver on the public test sets and writes the table to `docs/solver-proof.md`.
 pub(crate) fn proof() -> Outcome {
-    let mut run =
-        cargo(&["run", "--release", "--quiet", "--package", "gp-solver", "--example", "proof"]);
+    let machine = machine();
+    let mut run = cargo(&["run", "--release", "--quiet", "--package", "gp-solver"]);
+    run.args(["--example", "proof", "--", &machine]);
     let output = run.output().map_err(|e| format!("the proof could not start: {e}"))?;
     if !output.status.success() {
         let said = String::from_utf8_lossy(&output.stderr);

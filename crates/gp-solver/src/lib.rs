@@ -63,5 +63,5 @@ pub use min_norm::{MinNormProjection, ProjectionOptions, ProjectionReport};
 pub use options::{Factorization, Method, Options};
 pub use problem::{Elements, EnergyBlock, Problem, Quantity, ResidualBlock};
 pub use qp::{DenseQp, QpSolution, SparseEqualityQp};
-pub use quadratic::{QuadraticBuilder, QuadraticConstraints};
+pub use quadratic::{Equation, QuadraticBuilder, QuadraticConstraints};
 pub use report::{IterationRecord, Report, Status, Term, Timings};

@@ -49,10 +49,13 @@ pub struct Options {
     /// between the residual and a column of the Jacobian.
     pub gradient_tol: f64,
     /// Converged if a taken step has `‖s‖_D ≤ step_tol · ‖x‖_D`, with `D` the largest
-    /// `diag A` so far.
+    /// `diag A` so far; not if only the damping kept it small (`μ‖s‖²_D > s·A s`) while the
+    /// gradient is large.
     pub step_tol: f64,
     /// Converged if both the predicted and the actual decrease of a taken step are
-    /// `≤ energy_tol · E`.
+    /// `≤ energy_tol · E`; not if only the damping kept them small, as above. A refused step this
+    /// small, or too short to change the iterate, ends the solve likewise:
+    /// [`Stalled`](crate::Status::Stalled) if the gradient is large.
     pub energy_tol: f64,
     /// Converged if `E ≤ abs_energy_tol`.
     pub abs_energy_tol: f64,

@@ -16,6 +16,11 @@ const MAX_DAMPING: f64 = 1e16;
 const MENDING_DAMPING: f64 = 1e-16;
 /// Least share of the predicted decrease a step must bring.
 const MIN_GAIN: f64 = 1e-4;
+/// Largest cosine between the residual and a column of the Jacobian at which a step that is short
+/// only because it is damped may count as convergence.
+const ALIGNED: f64 = 1e-2;
+/// A step this short relative to the iterate, and hardly damped, says that the minimum is near.
+const NEAR: f64 = 1e-7;
 /// The first step may be this much longer than the start itself, in the scaled norm: longer ones
 /// tend to land on plateaus from which nothing leads back.
 const FIRST_STEP: f64 = 10.0;
@@ -197,6 +202,8 @@ struct Taken {
     actual_decrease: f64,
     damping: f64,
     factorizations: usize,
+    /// Whether the damping rather than the model ended the step.
+    is_held_back: bool,
 }
 
 impl<'s, 'a, F: FnMut(&Iteration<'_>) -> ControlFlow<()>> Run<'s, 'a, F> {
@@ -265,11 +272,12 @@ impl<'s, 'a, F: FnMut(&Iteration<'_>) -> ControlFlow<()>> Run<'s, 'a, F> {
             let small_change = taken.model.predicted_decrease.abs()
                 <= self.options.energy_tol * energy_before
                 && taken.actual_decrease.abs() <= self.options.energy_tol * energy_before;
+            let evidence = !taken.is_held_back || self.gradient_norm <= ALIGNED;
             self.take(&taken)?;
             if self.observe().is_break() {
                 return Ok(Status::Interrupted);
             }
-            if small_step || small_change {
+            if (small_step || small_change) && evidence {
                 return Ok(Status::Converged);
             }
         }
@@ -279,6 +287,7 @@ impl<'s, 'a, F: FnMut(&Iteration<'_>) -> ControlFlow<()>> Run<'s, 'a, F> {
     fn damped_step(&mut self) -> Result<Result<Taken, Status>, SolverError> {
         let (energy, rule) = (self.system.energy(), self.options.damping_rule);
         let mut factorizations = 0;
+        let mut is_near = self.gradient_norm <= ALIGNED;
         loop {
             factorizations += 1;
             let damping = self.damping;
@@ -308,17 +317,29 @@ impl<'s, 'a, F: FnMut(&Iteration<'_>) -> ControlFlow<()>> Run<'s, 'a, F> {
             self.system.stepped_into(self.x, &mut self.trial);
             let decrease = energy - self.system.energy_at(&self.trial);
             let gain = decrease / model.predicted_decrease;
+            let is_held_back = model.is_held_back(damping);
             if decrease >= 0.0 && gain >= MIN_GAIN {
                 self.damping = rule.after_success(self.system, damping, model, gain);
                 self.damping = self.damping.max(rule.least_damping());
-                return Ok(Ok(Taken { model, actual_decrease: decrease, damping, factorizations }));
+                return Ok(Ok(Taken {
+                    model,
+                    actual_decrease: decrease,
+                    damping,
+                    factorizations,
+                    is_held_back,
+                }));
             }
             // So short a step cannot change the iterate: this is as low as it gets.
-            let short = model.scaled_norm <= f64::EPSILON * self.system.scaled_norm(self.x);
+            let size = self.system.scaled_norm(self.x);
+            let short = model.scaled_norm <= f64::EPSILON * size;
+            is_near |= !is_held_back && model.scaled_norm <= NEAR * size;
             let flat = model.predicted_decrease <= self.options.energy_tol * energy
                 && decrease.abs() <= self.options.energy_tol * energy;
-            if short || flat {
+            if (short || flat) && is_near {
                 return Ok(Err(Status::Converged));
+            }
+            if short {
+                return Ok(Err(Status::Stalled));
             }
             self.damping = rule.after_refusal(self.system, damping, model, decrease);
             tracing::trace!(damping, decrease, "step refused");
@@ -344,7 +365,13 @@ impl<'s, 'a, F: FnMut(&Iteration<'_>) -> ControlFlow<()>> Run<'s, 'a, F> {
         if !actual_decrease.is_finite() {
             return Ok(Err(Status::Stalled));
         }
-        Ok(Ok(Taken { model, actual_decrease, damping: epsilon, factorizations: 1 }))
+        Ok(Ok(Taken {
+            model,
+            actual_decrease,
+            damping: epsilon,
+            factorizations: 1,
+            is_held_back: false,
+        }))
     }
 
     /// Moves to the trial point, refreshes and linearises there.

@@ -54,6 +54,14 @@ pub struct StepModel {
     pub scaled_norm: f64,
 }
 
+impl StepModel {
+    /// Whether the damping `μ` of this step weighed more in it than the model, `μ‖s‖²_D > s·A s`.
+    pub(crate) fn is_held_back(&self, damping: f64) -> bool {
+        // The predicted decrease is `½ s·A s + μ‖s‖²_D`.
+        3.0 * damping * self.scaled_norm.powi(2) > 2.0 * self.predicted_decrease
+    }
+}
+
 impl<'a> System<'a> {
     /// Checks and plans a problem.
     ///

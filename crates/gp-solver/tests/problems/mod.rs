@@ -3,9 +3,11 @@
 #![allow(unreachable_pub, reason = "a module shared by test programs, not a library")]
 
 pub mod dual;
+pub mod lifted;
 pub mod mgh;
 pub mod minpack;
 pub mod nist;
+pub mod quadratic;
 
 use dual::Dual;
 use gp_solver::{Elements, Options, Problem, Report, ResidualBlock, SolverError, solve};
