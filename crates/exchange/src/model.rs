@@ -97,6 +97,9 @@ impl Model {
 
 /// Extensions that [`read_model`] knows.
 pub const READABLE: &str = "ron, step, stp, obj, ply, off, stl, glb, json";
+/// Coordinates GLB's single precision can hold, distances between them included.
+const SINGLE_PRECISION: f64 = 1e38;
+
 /// Extensions that [`encode_model`] knows.
 pub const WRITABLE: &str = "ron, step, stp, obj, ply, stl, glb, json, svg, dxf";
 
@@ -179,7 +182,14 @@ pub fn encode_model(path: &Path, model: &Model) -> Result<Vec<u8>, WriteError> {
             }
             Ok(write_stl(&meshes))
         }
-        "glb" => Ok(write_glb(&model.sampled(), &model.unit)),
+        "glb" => {
+            let meshes = model.sampled();
+            let far = |p: &DVec3| !(p.abs().max_element() < SINGLE_PRECISION);
+            if meshes.iter().any(|mesh| mesh.positions.iter().any(far)) {
+                return Err(unsupported("GLB", "coordinates of 1e38 and beyond"));
+            }
+            Ok(write_glb(&meshes, &model.unit))
+        }
         // COMPAS has meshes and surfaces, geomdl surfaces only: the plain one where it suffices.
         "json" if model.meshes.is_empty() && !model.surfaces.is_empty() && !is_compas(path) => {
             Ok(write_geomdl(&model.surfaces).into_bytes())

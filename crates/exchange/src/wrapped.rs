@@ -30,7 +30,8 @@ impl Direction {
         let d = degree.get();
         let open = KnotVector::new(degree, knots)?;
         let mut periodic = None;
-        if closed && !open.is_clamped() && n > 2 * d {
+        // Knots for another number of points are refused later, with both numbers.
+        if closed && !open.is_clamped() && n > 2 * d && open.control_count() == n {
             let period = KnotVector::periodic(degree, &open.knots()[d..=n]).ok();
             periodic = period.filter(|p| p.knots() == open.knots());
         }

@@ -115,11 +115,17 @@ fn formats_refuse_what_they_cannot_hold() {
     }
     let error = encode_model(Path::new("a.step"), &model).unwrap_err().to_string();
     assert_eq!(error, "STEP cannot hold meshes; choose another extension, or fit surfaces first");
+    let mut far = mesh();
+    far.positions[3].x = -1e300;
+    let model = Model::of_mesh(far, LengthUnit::Millimetre);
+    let error = encode_model(Path::new("a.glb"), &model).unwrap_err().to_string();
+    assert!(error.starts_with("GLB cannot hold coordinates of 1e38 and beyond"), "{error}");
 }
 
 #[test]
 fn json_faults_name_place_and_mend() {
     let surface = write_geomdl(&surfaces()[..1]);
+    let closed = write_geomdl(&surfaces()[1..2]);
     let model = Model::of_mesh(mesh(), LengthUnit::Millimetre);
     let mesh = write_compas(&model);
     let cases = [
@@ -129,6 +135,8 @@ fn json_faults_name_place_and_mend() {
             "surface 1: degree 40 is not between",
         ),
         (surface.replace("\"size_u\":9", "\"size_u\":\"9\""), "line 1: column"),
+        // The open knots of a closed direction, for more points than they can have.
+        (closed.replace("\"size_u\":12", "\"size_u\":28"), "surface 1: the knots need 12"),
         (surface.replace("\"surface\"", "\"curve\""), "a geomdl file of type `curve`"),
         (surface[..400].to_owned(), "line 1: column"),
         (mesh.replace("[0,3,4,1]", "[0,3,4,99]"), "item 1: face 0 names vertex 99"),

@@ -49,7 +49,7 @@ fn run(block: impl ResidualBlock, start: f64, options: &Options) -> (f64, Report
     let mut problem = Problem::new(1);
     problem.add(block);
     let mut x = [start];
-    let report = solve(problem, &mut x, options).unwrap();
+    let report = solve(problem, &mut x, options).expect("the start can be evaluated");
     (x[0], report)
 }
 
