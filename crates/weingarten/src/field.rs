@@ -53,7 +53,7 @@ struct SampleKernel<'a> {
 
 impl LaneKernel<THIRD> for SampleKernel<'_> {
     #[inline(always)]
-    fn run<S: Simd>(&mut self, simd: S, at: usize, d: &[Triple<Lanes<S>>; THIRD]) {
+    fn run<S: Simd>(&mut self, _: S, at: usize, d: &[Triple<Lanes<S>>; THIRD]) {
         let jet = curvature_jet(d);
         let rows = [
             d[0].x,
@@ -70,7 +70,7 @@ impl LaneKernel<THIRD> for SampleKernel<'_> {
             jet.k_v,
         ];
         for (row, value) in self.out.chunks_exact_mut(self.stride).zip(rows) {
-            store(simd, row, at, value);
+            store(row, at, value);
         }
     }
 }
@@ -111,9 +111,9 @@ struct DeltaKernel<'a> {
 
 impl LaneKernel<FIRST> for DeltaKernel<'_> {
     #[inline(always)]
-    fn run<S: Simd>(&mut self, simd: S, at: usize, d: &[Triple<Lanes<S>>; FIRST]) {
+    fn run<S: Simd>(&mut self, _: S, at: usize, d: &[Triple<Lanes<S>>; FIRST]) {
         let normal = d[1].cross(d[2]);
-        store(simd, self.out, at, normal.dot(normal));
+        store(self.out, at, normal.dot(normal));
     }
 }
 
@@ -135,11 +135,11 @@ struct ParallelScale<'a> {
 
 impl LaneKernel<FOURTH> for ParallelScale<'_> {
     #[inline(always)]
-    fn run<S: Simd>(&mut self, simd: S, at: usize, d: &[Triple<Lanes<S>>; FOURTH]) {
+    fn run<S: Simd>(&mut self, _: S, at: usize, d: &[Triple<Lanes<S>>; FOURTH]) {
         let jet = parallel_jet(self.field, d);
         let rows = [jet.f_u, jet.f_v, jet.psi_u, jet.psi_v];
         for (row, value) in self.out.chunks_exact_mut(self.stride).zip(rows) {
-            store(simd, row, at, value);
+            store(row, at, value);
         }
     }
 }

@@ -1,20 +1,21 @@
-//! A grid of samples on a surface: derivatives by sum factorisation, and rows of a Jacobian back
-//! from gradients at the samples.
+//! A grid of samples on a surface: derivatives at the samples, and rows of a Jacobian back from
+//! gradients there.
 //!
 //! The unknowns are the coordinates of the control points, `3 (i n_v + j) + axis`. Weights of a
-//! rational surface stay fixed, so derivatives are linear in the unknowns there too: with
-//! `A = Σ w c N` and `R = 1/W`, a derivative of `s = A R` is a combination of derivatives of `A`
-//! with fixed coefficients.
+//! rational surface stay fixed, so derivatives are linear in the unknowns there too.
 
 use std::borrow::Cow;
+use std::ops::Range;
 
 use bspline::BsplineSurface;
 use gp_solver::Elements;
 use pulp::{Simd, WithSimd};
 
 use crate::axis::Axis;
-use crate::kernel::{FOURTH, ORDERS, order_index};
+use crate::kernel::{ORDERS, SECOND};
+use crate::rational::Rational;
 use crate::real::{Lanes, Triple};
+use crate::tensor::{Differentiate, ExpandRow, ExpandSample};
 
 /// Rows of samples are padded to this many, a multiple of every register's lanes.
 const PAD: usize = 8;
@@ -24,15 +25,7 @@ const PAD: usize = 8;
 pub(crate) struct SampleGrid {
     pub(crate) u: Axis,
     pub(crate) v: Axis,
-    rational: Option<Rational>,
-}
-
-/// What the fixed weights contribute.
-#[derive(Clone, Debug)]
-struct Rational {
-    weights: Vec<f64>,
-    /// Derivatives of `1/W` at every sample.
-    reciprocals: Vec<[f64; FOURTH]>,
+    pub(crate) rational: Option<Rational>,
 }
 
 /// Buffers of one worker.
@@ -40,8 +33,6 @@ struct Rational {
 pub(crate) struct Scratch {
     half: Vec<f64>,
     derivatives: Vec<f64>,
-    pub(crate) gradient: Vec<f64>,
-    pub(crate) residual: Vec<f64>,
 }
 
 /// What is done with the derivative vectors of a register full of samples.
@@ -63,16 +54,13 @@ impl<const N: usize, K: LaneKernel<N>> WithSimd for Sweep<'_, N, K> {
     fn with_simd<S: Simd>(self, simd: S) {
         let lanes = S::F64_LANES;
         for at in (0..self.stride).step_by(lanes) {
-            let load = |row: usize| {
-                let start = row * self.stride + at;
-                let value = simd.partial_load_f64s(&self.derivatives[start..start + lanes]);
-                Lanes::new(simd, value)
-            };
-            let d: [Triple<Lanes<S>>; N] = std::array::from_fn(|o| Triple {
-                x: load(3 * o),
-                y: load(3 * o + 1),
-                z: load(3 * o + 2),
-            });
+            let zero = Lanes::new(simd, simd.splat_f64s(0.0));
+            let mut d = [Triple { x: zero, y: zero, z: zero }; N];
+            for (vector, rows) in d.iter_mut().zip(self.derivatives.chunks_exact(3 * self.stride)) {
+                vector.x = load(simd, &rows[..self.stride], at);
+                vector.y = load(simd, &rows[self.stride..2 * self.stride], at);
+                vector.z = load(simd, &rows[2 * self.stride..], at);
+            }
             self.kernel.run(simd, at, &d);
         }
     }
@@ -80,28 +68,22 @@ impl<const N: usize, K: LaneKernel<N>> WithSimd for Sweep<'_, N, K> {
 
 /// Writes a register of samples to `row`, starting at sample `at`.
 #[inline(always)]
-pub(crate) fn store<S: Simd>(simd: S, row: &mut [f64], at: usize, value: Lanes<S>) {
-    simd.partial_store_f64s(&mut row[at..at + S::F64_LANES], value.value);
+pub(crate) fn store<S: Simd>(row: &mut [f64], at: usize, value: Lanes<S>) {
+    S::as_mut_simd_f64s(&mut row[at..at + S::F64_LANES]).0[0] = value.value;
 }
 
 /// Reads a register of samples from `row`.
 #[inline(always)]
 pub(crate) fn load<S: Simd>(simd: S, row: &[f64], at: usize) -> Lanes<S> {
-    Lanes::new(simd, simd.partial_load_f64s(&row[at..at + S::F64_LANES]))
+    Lanes::new(simd, S::as_simd_f64s(&row[at..at + S::F64_LANES]).0[0])
 }
 
 impl SampleGrid {
     /// A grid at the given parameters of `surface`, which must rise and lie in its domain.
     pub(crate) fn new(surface: &BsplineSurface, u: Vec<f64>, v: Vec<f64>) -> Self {
         let (u, v) = (Axis::new(surface.knots_u(), u), Axis::new(surface.knots_v(), v));
-        let mut grid = Self { u, v, rational: None };
-        if let Some(weights) = surface.weights() {
-            grid.rational = Some(Rational {
-                weights: weights.to_vec(),
-                reciprocals: grid.reciprocals(weights),
-            });
-        }
-        grid
+        let rational = surface.weights().map(|weights| Rational::new(&u, &v, weights));
+        Self { u, v, rational }
     }
 
     /// `m_u × m_v` samples at equal parameter distances, ends included, a period's end excluded.
@@ -177,51 +159,6 @@ impl SampleGrid {
         Cow::Owned(unrolled)
     }
 
-    /// Derivative vectors of all samples of row `i` into `scratch`, up to the total order of `n`
-    /// vectors; `unrolled` comes from [`SampleGrid::unroll`].
-    fn differentiate(&self, i: usize, unrolled: &[f64], n: usize, scratch: &mut Scratch) {
-        let (width, stride) = (3 * self.v.functions, self.stride());
-        let top = ORDERS[n - 1].0 + ORDERS[n - 1].1;
-        scratch.half.resize((top + 1) * width, 0.0);
-        scratch.derivatives.resize(3 * n * stride, 0.0);
-        let base = self.u.base(i) * width;
-        for a in 0..=top {
-            let half = &mut scratch.half[a * width..(a + 1) * width];
-            half.fill(0.0);
-            for (p, &value) in self.u.values(i, a).iter().enumerate() {
-                let row = &unrolled[base + p * width..base + (p + 1) * width];
-                for (h, c) in half.iter_mut().zip(row) {
-                    *h += value * c;
-                }
-            }
-        }
-        let mut vectors = [[0.0; 3]; FOURTH];
-        for j in 0..stride {
-            let s = j.min(self.v.len() - 1);
-            if s == j {
-                let start = 3 * self.v.base(s);
-                for (vector, &(a, b)) in vectors.iter_mut().zip(&ORDERS[..n]) {
-                    let half = &scratch.half[a * width + start..];
-                    let mut sum = [0.0; 3];
-                    for (value, c) in self.v.values(s, b).iter().zip(half.chunks_exact(3)) {
-                        for axis in 0..3 {
-                            sum[axis] += value * c[axis];
-                        }
-                    }
-                    *vector = sum;
-                }
-                if let Some(r) = &self.rational {
-                    divide(&r.reciprocals[i * self.v.len() + s], &mut vectors[..n]);
-                }
-            }
-            for (o, vector) in vectors[..n].iter().enumerate() {
-                for axis in 0..3 {
-                    scratch.derivatives[(3 * o + axis) * stride + j] = vector[axis];
-                }
-            }
-        }
-    }
-
     /// Runs `kernel` over the samples of row `i`.
     pub(crate) fn sweep<const N: usize, K: LaneKernel<N>>(
         &self,
@@ -230,137 +167,52 @@ impl SampleGrid {
         scratch: &mut Scratch,
         kernel: &mut K,
     ) {
-        self.differentiate(i, unrolled, N, scratch);
-        let (derivatives, stride) = (scratch.derivatives.as_slice(), self.stride());
-        pulp::Arch::new().dispatch(Sweep { derivatives, stride, kernel });
-    }
-
-    /// The Jacobian row of sample `(i, j)`: `gradient` holds, for each of `n` derivative vectors
-    /// and each axis, a padded row of samples.
-    pub(crate) fn expand(&self, i: usize, j: usize, n: usize, gradient: &[f64], row: &mut [f64]) {
         let stride = self.stride();
-        let mut g = [[0.0; 3]; FOURTH];
-        for (o, vector) in g[..n].iter_mut().enumerate() {
-            *vector = std::array::from_fn(|axis| gradient[(3 * o + axis) * stride + j]);
-        }
-        self.expand_vectors(i, j, &mut g[..n], row);
+        scratch.derivatives.resize(3 * N * stride, 0.0);
+        let arch = pulp::Arch::new();
+        arch.dispatch(Differentiate {
+            grid: self,
+            i,
+            unrolled,
+            top: top_order(N),
+            half: &mut scratch.half,
+            derivatives: &mut scratch.derivatives,
+        });
+        arch.dispatch(Sweep { derivatives: &scratch.derivatives, stride, kernel });
     }
 
-    /// As [`SampleGrid::expand`] from the gradient by each derivative vector; uses `g` up.
-    pub(crate) fn expand_vectors(&self, i: usize, j: usize, g: &mut [[f64; 3]], row: &mut [f64]) {
-        let n = g.len();
-        if let Some(r) = &self.rational {
-            transpose_divide(&r.reciprocals[i * self.v.len() + j], g);
-        }
-        let top = ORDERS[n - 1].0 + ORDERS[n - 1].1;
-        let width = 3 * self.v.order;
-        // First over v, then over u: `half[a]` collects all orders with `a` derivatives by u.
-        let mut half = [[0.0; 3 * 16]; 5];
-        for (vector, &(a, b)) in g.iter().zip(&ORDERS[..n]) {
-            let slots = half[a].chunks_exact_mut(3);
-            for (value, slot) in self.v.values(j, b).iter().zip(slots) {
-                for axis in 0..3 {
-                    slot[axis] += value * vector[axis];
-                }
-            }
-        }
-        for (p, slots) in row.chunks_exact_mut(width).enumerate() {
-            slots.fill(0.0);
-            for (a, half) in half[..=top].iter().enumerate() {
-                let value = self.u.values(i, a)[p];
-                for (slot, h) in slots.iter_mut().zip(half) {
-                    *slot += value * h;
-                }
-            }
-        }
-        if let Some(r) = &self.rational {
-            for p in 0..self.u.order {
-                let k = self.u.wrap(self.u.base(i) + p) * self.v.control;
-                for q in 0..self.v.order {
-                    let weight = r.weights[k + self.v.wrap(self.v.base(j) + q)];
-                    let first = 3 * (p * self.v.order + q);
-                    row[first..first + 3].iter_mut().for_each(|x| *x *= weight);
-                }
-            }
-        }
+    /// The Jacobian rows of the samples `(i, …)`, where `i` lies in the run `run` of knot span
+    /// rows: `gradient` holds, for each of `n` derivative vectors and each axis, a padded row of
+    /// samples, and `out` the rows of the whole run in the order of [`SampleGrid::elements`].
+    pub(crate) fn expand_row(
+        &self,
+        i: usize,
+        run: &Range<usize>,
+        n: usize,
+        gradient: &[f64],
+        out: &mut [f64],
+    ) {
+        let top = top_order(n);
+        pulp::Arch::new().dispatch(ExpandRow { grid: self, i, run, top, gradient, out });
     }
 
-    /// Derivatives of the reciprocal weight function at every sample.
-    fn reciprocals(&self, weights: &[f64]) -> Vec<[f64; FOURTH]> {
-        let mut result = Vec::with_capacity(self.len());
-        for i in 0..self.u.len() {
-            for j in 0..self.v.len() {
-                let mut w = [0.0; FOURTH];
-                for p in 0..self.u.order {
-                    let row = self.u.wrap(self.u.base(i) + p) * self.v.control;
-                    for q in 0..self.v.order {
-                        let weight = weights[row + self.v.wrap(self.v.base(j) + q)];
-                        for (o, &(a, b)) in ORDERS.iter().enumerate() {
-                            w[o] += weight * self.u.values(i, a)[p] * self.v.values(j, b)[q];
-                        }
-                    }
-                }
-                result.push(reciprocal(&w));
-            }
-        }
-        result
+    /// The Jacobian row of sample `(i, j)` from the gradient by each derivative vector up to
+    /// second order; uses `vectors` up.
+    pub(crate) fn expand(
+        &self,
+        i: usize,
+        j: usize,
+        vectors: &mut [[f64; 4]; SECOND],
+        row: &mut [f64],
+    ) {
+        pulp::Arch::new().dispatch(ExpandSample { grid: self, i, j, vectors, row });
     }
 }
 
-const BINOMIAL: [[f64; 5]; 5] = [
-    [1.0, 0.0, 0.0, 0.0, 0.0],
-    [1.0, 1.0, 0.0, 0.0, 0.0],
-    [1.0, 2.0, 1.0, 0.0, 0.0],
-    [1.0, 3.0, 3.0, 1.0, 0.0],
-    [1.0, 4.0, 6.0, 4.0, 1.0],
-];
-
-/// The terms of `(f g)^(a,b)`: index in `f`, index in `g`, coefficient (Leibniz).
-fn leibniz(a: usize, b: usize) -> impl Iterator<Item = (usize, usize, f64)> {
-    (0..=a).flat_map(move |k| {
-        (0..=b).map(move |l| {
-            (order_index(a - k, b - l), order_index(k, l), BINOMIAL[a][k] * BINOMIAL[b][l])
-        })
-    })
-}
-
-/// Derivatives of `1/W` from those of `W`: `(R W)^(a,b) = 0` beyond order zero.
-fn reciprocal(w: &[f64; FOURTH]) -> [f64; FOURTH] {
-    let mut r = [0.0; FOURTH];
-    r[0] = 1.0 / w[0];
-    for (o, &(a, b)) in ORDERS.iter().enumerate().skip(1) {
-        // The term of `R^(a,b) W` is the one sought; its slot in `r` is still zero.
-        let sum: f64 = leibniz(a, b).map(|(f, g, c)| c * w[f] * r[g]).sum();
-        r[o] = -sum * r[0];
-    }
-    r
-}
-
-/// Derivatives of `A` to derivatives of `s = A R`, in place.
-fn divide(r: &[f64; FOURTH], vectors: &mut [[f64; 3]]) {
-    for o in (0..vectors.len()).rev() {
-        let (a, b) = ORDERS[o];
-        let mut sum = [0.0; 3];
-        for (f, g, c) in leibniz(a, b) {
-            for axis in 0..3 {
-                sum[axis] += c * r[g] * vectors[f][axis];
-            }
-        }
-        vectors[o] = sum;
-    }
-}
-
-/// The transpose of [`divide`]: gradients by derivatives of `s` to gradients by those of `A`.
-fn transpose_divide(r: &[f64; FOURTH], gradient: &mut [[f64; 3]]) {
-    for o in 0..gradient.len() {
-        let (a, b) = ORDERS[o];
-        let from = std::mem::take(&mut gradient[o]);
-        for (f, g, c) in leibniz(a, b) {
-            for axis in 0..3 {
-                gradient[f][axis] += c * r[g] * from[axis];
-            }
-        }
-    }
+/// The highest total order among the first `n` derivative vectors.
+fn top_order(n: usize) -> usize {
+    let (a, b) = ORDERS[n - 1];
+    a + b
 }
 
 /// Splits per-run slices of a residual and a Jacobian off, so that runs fill them in parallel.

@@ -4,6 +4,9 @@
 //! Derivative vectors stand in the order `s, s_u, s_v, s_uu, s_uv, s_vv, s_uuu, …`: derivative
 //! `(a, b)` has index [`order_index`]. No derivative tensor is ever formed: every second-order
 //! quantity is a Hessian–vector product, got by running the gradient on dual numbers.
+//!
+//! No closures here: one that is not inlined is compiled without the vector instructions of its
+//! caller, and every operation in it becomes a call.
 
 use crate::real::{Dual, Real, Triple, dual, slope};
 
@@ -154,7 +157,11 @@ fn combine<T: Real, const N: usize>(
     beta: T,
     y: &[Triple<T>; N],
 ) -> [Triple<T>; N] {
-    std::array::from_fn(|i| x[i].scale(alpha).plus(beta, y[i]))
+    let mut sum = *x;
+    for i in 0..N {
+        sum[i] = x[i].scale(alpha).plus(beta, y[i]);
+    }
+    sum
 }
 
 #[inline(always)]
@@ -162,7 +169,11 @@ fn dual_array<T: Real, const N: usize>(
     x: &[Triple<T>; N],
     direction: &[Triple<T>; N],
 ) -> [Triple<Dual<T>>; N] {
-    std::array::from_fn(|i| dual(x[i], direction[i]))
+    let mut result = [dual(x[0], direction[0]); N];
+    for i in 1..N {
+        result[i] = dual(x[i], direction[i]);
+    }
+    result
 }
 
 /// Curvatures and their parameter derivatives at a sample.
@@ -293,8 +304,18 @@ pub(crate) struct ParallelJet<T> {
     pub(crate) psi_v: T,
 }
 
+const UNSHIFTED: [usize; 9] = [1, 2, 3, 4, 5, 6, 7, 8, 9];
 const SHIFT_U: [usize; 9] = [3, 4, 6, 7, 8, 10, 11, 12, 13];
 const SHIFT_V: [usize; 9] = [4, 5, 7, 8, 9, 11, 12, 13, 14];
+
+#[inline(always)]
+fn pick<T: Real>(d: &[Triple<T>; FOURTH], places: [usize; 9]) -> [Triple<T>; 9] {
+    let mut picked = [d[0]; 9];
+    for i in 0..9 {
+        picked[i] = d[places[i]];
+    }
+    picked
+}
 
 #[inline(always)]
 fn parallel_parts<T: Real>(
@@ -303,9 +324,7 @@ fn parallel_parts<T: Real>(
 ) -> (ParallelJet<T>, [Triple<T>; 9], Second<T>) {
     let p = second(d);
     let gradient = field_with_gradient(field, &p).1;
-    let q: [Triple<T>; 9] = std::array::from_fn(|i| d[1 + i]);
-    let qu = SHIFT_U.map(|i| d[i]);
-    let qv = SHIFT_V.map(|i| d[i]);
+    let (q, qu, qv) = (pick(d, UNSHIFTED), pick(d, SHIFT_U), pick(d, SHIFT_V));
     let grad_psi = gradient_norm(field, &q).1;
     let jet = ParallelJet {
         f_u: inner(&gradient, &second_u(d)),
@@ -329,9 +348,7 @@ pub(crate) fn parallel<T: Real>(field: Field, d: &[Triple<T>; FOURTH]) -> (T, [T
     let (jet, grad_psi, gradient) = parallel_parts(field, d);
     let ParallelJet { f_u, f_v, psi_u, psi_v } = jet;
     let p = second(d);
-    let q: [Triple<T>; 9] = std::array::from_fn(|i| d[1 + i]);
-    let qu = SHIFT_U.map(|i| d[i]);
-    let qv = SHIFT_V.map(|i| d[i]);
+    let (q, qu, qv) = (pick(d, UNSHIFTED), pick(d, SHIFT_U), pick(d, SHIFT_V));
     let hess_psi = gradient_norm(field, &dual_array(&q, &combine(f_v, &qu, -f_u, &qv))).1;
     let along = combine(psi_u, &second_v(d), -psi_v, &second_u(d));
     let hess_f = field_with_gradient(field, &dual_array(&p, &along)).1;
@@ -346,8 +363,11 @@ pub(crate) fn parallel<T: Real>(field: Field, d: &[Triple<T>; FOURTH]) -> (T, [T
         grad[SHIFT_U[i]] = grad[SHIFT_U[i]].plus(f_v, grad_psi[i]);
         grad[SHIFT_V[i]] = grad[SHIFT_V[i]].plus(-f_u, grad_psi[i]);
     }
-    let by_u = gradient.map(|g| g.scale(-psi_v));
-    let by_v = gradient.map(|g| g.scale(psi_u));
+    let (mut by_u, mut by_v) = (gradient, gradient);
+    for i in 0..5 {
+        by_u[i] = gradient[i].scale(-psi_v);
+        by_v[i] = gradient[i].scale(psi_u);
+    }
     add_shifted(&mut grad, &by_u, &by_v);
     (psi_u * f_v - psi_v * f_u, grad)
 }

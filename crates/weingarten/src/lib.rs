@@ -36,9 +36,11 @@ mod lifted;
 mod metrics;
 mod optimize;
 mod options;
+mod rational;
 mod real;
 mod relation;
 mod target;
+mod tensor;
 #[cfg(test)]
 mod tests;
 

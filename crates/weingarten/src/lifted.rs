@@ -302,12 +302,12 @@ impl Definitions {
             row[2 + k] = scaled(n, -inverse);
         }
         for (r, gradient) in gradients.iter().enumerate() {
-            let mut vectors = [[0.0; 3]; SECOND];
+            let mut vectors = [[0.0; 4]; SECOND];
             for (slot, g) in vectors[1..].iter_mut().zip(gradient) {
-                *slot = [g.x, g.y, g.z];
+                *slot = [g.x, g.y, g.z, 0.0];
             }
             let row = &mut out[r * width..(r + 1) * width];
-            grid.expand_vectors(i, j, &mut vectors, &mut row[..control]);
+            grid.expand(i, j, &mut vectors, &mut row[..control]);
             row[control + r] = 1.0;
         }
         // L, M, N also read n.
@@ -371,12 +371,12 @@ struct Vectors<'a> {
 
 impl LaneKernel<SECOND> for Vectors<'_> {
     #[inline(always)]
-    fn run<S: pulp::Simd>(&mut self, simd: S, at: usize, d: &[Triple<Lanes<S>>; SECOND]) {
+    fn run<S: pulp::Simd>(&mut self, _: S, at: usize, d: &[Triple<Lanes<S>>; SECOND]) {
         for (rows, vector) in self.out.chunks_exact_mut(3 * self.stride).zip(&d[1..]) {
             for (row, value) in
                 rows.chunks_exact_mut(self.stride).zip([vector.x, vector.y, vector.z])
             {
-                store(simd, row, at, value);
+                store(row, at, value);
             }
         }
     }

@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use super::gram::{gram_into, padded};
+use super::gram::{AddGram, Run, Targets};
 use crate::error::SolverError;
 use crate::linear::{Factor, Storage};
 use crate::options::Factorization;
@@ -11,11 +11,12 @@ use crate::problem::{Block, Elements, Problem};
 /// Mark of a fixed unknown.
 const FIXED: u32 = u32::MAX;
 
-/// Consecutive positions of an element's sorted columns.
+/// Columns that follow one another both in the element and in a run.
 #[derive(Clone, Copy)]
-struct Run {
-    begin: u32,
-    end: u32,
+struct Piece {
+    from: u32,
+    to: u32,
+    len: u32,
 }
 
 /// What is known of a block before any value is: which columns are free, in which order they
@@ -25,6 +26,9 @@ struct BlockPlan {
     starts: Vec<usize>,
     /// Column within the element, sorted by position.
     local: Vec<u32>,
+    piece_starts: Vec<usize>,
+    /// How a row of the element is packed.
+    pieces: Vec<Piece>,
     /// Position in the system.
     position: Vec<u32>,
     run_starts: Vec<usize>,
@@ -49,9 +53,35 @@ pub(crate) struct Scratch {
     product: Vec<f64>,
 }
 
+impl Scratch {
+    /// Packs the rows of an element to a length of `stride`, zeros between the runs.
+    fn pack<'r>(
+        &mut self,
+        pieces: &[Piece],
+        rows: impl ExactSizeIterator<Item = &'r [f64]>,
+        stride: usize,
+    ) {
+        self.packed.clear();
+        self.packed.resize(stride * rows.len(), 0.0);
+        for (row, packed) in rows.zip(self.packed.chunks_exact_mut(stride)) {
+            for &Piece { from, to, len } in pieces {
+                let (from, to, len) = (from as usize, to as usize, len as usize);
+                let (from, to) = (&row[from..from + len], &mut packed[to..to + len]);
+                if len == 3 {
+                    // The coordinates of a point; too short for a call to copy memory.
+                    (to[0], to[1], to[2]) = (from[0], from[1], from[2]);
+                } else {
+                    to.copy_from_slice(from);
+                }
+            }
+        }
+    }
+}
+
 impl BlockPlan {
     fn new(elements: &Elements, position: &[u32]) -> Self {
-        let mut plan = Self { starts: vec![0], run_starts: vec![0], ..Self::default() };
+        let mut plan =
+            Self { starts: vec![0], run_starts: vec![0], piece_starts: vec![0], ..Self::default() };
         let mut columns = Vec::new();
         for e in 0..elements.len() {
             columns.clear();
@@ -64,15 +94,26 @@ impl BlockPlan {
             for (k, &(p, local)) in columns.iter().enumerate() {
                 plan.position.push(p);
                 plan.local.push(local);
-                let last = plan.runs.len();
-                if k > 0 && columns[k - 1].0 + 1 == p {
-                    plan.runs[last - 1].end += 1;
-                } else {
-                    plan.runs.push(Run { begin: k as u32, end: k as u32 + 1 });
+                let k = k as u32;
+                let at = match plan.runs.last_mut().filter(|_| k > 0) {
+                    Some(run) if columns[k as usize - 1].0 + 1 == p => {
+                        run.end += 1;
+                        run.at + k - run.begin
+                    }
+                    last => {
+                        let at = last.map_or(0, |run| run.packed_end());
+                        plan.runs.push(Run { begin: k, end: k + 1, at });
+                        at
+                    }
+                };
+                match plan.pieces.last_mut().filter(|_| k > 0) {
+                    Some(p) if p.from + p.len == local && p.to + p.len == at => p.len += 1,
+                    _ => plan.pieces.push(Piece { from: local, to: at, len: 1 }),
                 }
             }
             plan.starts.push(plan.position.len());
             plan.run_starts.push(plan.runs.len());
+            plan.piece_starts.push(plan.pieces.len());
         }
         plan
     }
@@ -89,8 +130,16 @@ impl BlockPlan {
         &self.position[self.range(e)]
     }
 
+    fn pieces(&self, e: usize) -> &[Piece] {
+        &self.pieces[self.piece_starts[e]..self.piece_starts[e + 1]]
+    }
+
     fn runs(&self, e: usize) -> &[Run] {
         &self.runs[self.run_starts[e]..self.run_starts[e + 1]]
+    }
+
+    fn targets(&self, e: usize) -> &[u32] {
+        &self.targets[self.target_starts[e]..self.target_starts[e + 1]]
     }
 
     /// Looks up where the products go in compressed columns.
@@ -169,13 +218,14 @@ impl NormalPlan {
         scratch: &mut Scratch,
     ) {
         let plan = &self.blocks[block];
+        let arch = pulp::Arch::new();
         for e in 0..plan.len() {
             let range = plan.range(e);
             let local = &plan.local[range.clone()];
             let positions = &plan.position[range];
-            let (k, width) = (local.len(), elements.columns(e).len());
+            let width = elements.columns(e).len();
             let rows = elements.rows(e);
-            if k == 0 || rows.is_empty() {
+            if local.is_empty() || rows.is_empty() {
                 continue;
             }
             let jacobian = &jacobian[elements.jacobian_range(e)];
@@ -188,25 +238,22 @@ impl NormalPlan {
                 }
                 continue;
             };
-            // The residual goes along as one more column, so that the product's last row is Jᵀr.
-            let stride = padded(k + 1);
-            scratch.packed.clear();
-            scratch.packed.resize(stride * residuals.len(), 0.0);
-            for ((row, &r), packed) in jacobian
-                .chunks_exact(width)
-                .zip(residuals)
-                .zip(scratch.packed.chunks_exact_mut(stride))
-            {
-                for (to, &c) in packed.iter_mut().zip(local) {
-                    *to = row[c as usize];
+            let runs = plan.runs(e);
+            let stride = runs[runs.len() - 1].packed_end() as usize;
+            scratch.pack(plan.pieces(e), jacobian.chunks_exact(width), stride);
+            let targets = match self.stride {
+                Some(stride) => Targets::Band { stride, positions },
+                None => Targets::Columns(plan.targets(e)),
+            };
+            let (x, products) = (&scratch.packed, &mut scratch.product);
+            arch.dispatch(AddGram { x, stride, runs, targets, residuals, values, products });
+            for run in runs {
+                let first = positions[run.begin as usize] as usize;
+                let sums = &scratch.product[run.at as usize..][..run.len()];
+                for (to, &sum) in gradient[first..].iter_mut().zip(sums) {
+                    *to += sum;
                 }
-                packed[k] = r;
             }
-            gram_into(&scratch.packed, stride, k + 1, &mut scratch.product);
-            for (b, &p) in positions.iter().enumerate() {
-                gradient[p as usize] += scratch.product[b * stride + k];
-            }
-            self.scatter(block, e, &scratch.product, stride, values);
         }
     }
 
@@ -248,7 +295,7 @@ impl NormalPlan {
         let mut first = 0;
         let mut targets = match self.stride {
             Some(_) => [].iter(),
-            None => plan.targets[plan.target_starts[e]..plan.target_starts[e + 1]].iter(),
+            None => plan.targets(e).iter(),
         };
         for (b, &column) in positions.iter().enumerate() {
             if runs[first].end as usize <= b {

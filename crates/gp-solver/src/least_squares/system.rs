@@ -27,8 +27,9 @@ pub struct System<'a> {
     plan: NormalPlan,
     factor: Factor,
     values: Vec<BlockValues>,
-    /// Matrix part of the linear blocks.
-    constant: Vec<f64>,
+    /// Matrix part of the linear blocks: where, and what. Such blocks couple few unknowns, so
+    /// that this is far shorter than the matrix.
+    constant: Vec<(u32, f64)>,
     matrix: Vec<f64>,
     gradient: Vec<f64>,
     diagonal: Vec<f64>,
@@ -83,7 +84,7 @@ impl<'a> System<'a> {
         let n = plan.size();
         Ok(Self {
             values,
-            constant: vec![0.0; factor.values_len()],
+            constant: Vec::new(),
             matrix: vec![0.0; factor.values_len()],
             gradient: vec![0.0; n],
             diagonal: vec![0.0; n],
@@ -247,25 +248,40 @@ impl<'a> System<'a> {
         Ok(self.energy)
     }
 
-    fn form(&mut self) {
+    /// Forms the matrix part of the linear blocks, once.
+    fn form_constant(&mut self) {
+        self.matrix.fill(0.0);
+        // Zero rows are not worth a thought: the gradient is formed with the rest.
+        let mut unused = vec![0.0; self.plan.size()];
         for (b, block) in self.problem.blocks.iter().enumerate() {
-            let values = &mut self.values[b];
-            if is_constant(block) && !values.linearized {
-                // Zero rows are not worth a thought: the gradient is formed below.
-                let mut unused = vec![0.0; self.plan.size()];
+            if is_constant(block) {
+                let values = &mut self.values[b];
                 self.plan.add_rows(
                     b,
                     block.elements(),
                     &values.derivatives,
                     &values.residuals,
                     &mut unused,
-                    Some(&mut self.constant),
+                    Some(&mut self.matrix),
                     &mut self.scratch,
                 );
                 values.linearized = true;
             }
         }
-        self.matrix.copy_from_slice(&self.constant);
+        let entries = self.matrix.iter().zip(0..).filter(|(value, _)| **value != 0.0);
+        self.constant = entries.map(|(&value, slot)| (slot, value)).collect();
+    }
+
+    fn form(&mut self) {
+        let is_new =
+            |(block, values): (&Block<'_>, &BlockValues)| is_constant(block) && !values.linearized;
+        if self.problem.blocks.iter().zip(&self.values).any(is_new) {
+            self.form_constant();
+        }
+        self.matrix.fill(0.0);
+        for &(slot, value) in &self.constant {
+            self.matrix[slot as usize] = value;
+        }
         self.gradient.fill(0.0);
         for (b, block) in self.problem.blocks.iter().enumerate() {
             let values = &self.values[b];

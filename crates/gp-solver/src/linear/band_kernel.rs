@@ -4,11 +4,16 @@
 //! `G × G`, each by columns: block `b` holds columns `(I − blocks + b) G ..`, the last one is
 //! the diagonal block. Blocks left of column 0 are never touched.
 
+use std::ops::Range;
+
 use pulp::{Simd, WithSimd};
 
 /// Columns of a block that are processed before the tile moves on, so that both operands of a
 /// tile stay in the first-level cache.
 const DEPTH: usize = 96;
+
+/// Panels formed at a time.
+pub(super) const PANELS: usize = 4;
 
 /// Rows of a group on this machine.
 pub(super) fn group_rows() -> usize {
@@ -51,9 +56,9 @@ impl Layout {
         self.rows * self.rows
     }
 
-    /// Groups below a panel that reach into it.
-    pub(super) fn groups_below(self, panel: usize) -> usize {
-        self.blocks.min(self.groups() - 1 - panel)
+    /// One past the last group that reaches into a panel.
+    pub(super) fn groups_end(self, panel: usize) -> usize {
+        self.groups().min(panel + self.blocks + 1)
     }
 
     /// Offset of block column `column` in group `group`.
@@ -64,9 +69,17 @@ impl Layout {
     /// Copies block `(group, panel)` of the matrix; outside the band it is zero, past the end
     /// of the matrix the identity.
     #[inline(always)]
-    fn load(self, values: &[f64], group: usize, panel: usize, block: &mut [f64]) {
-        let (g, n, kd) = (self.rows, self.size, self.half_bandwidth);
+    fn load<const G: usize>(self, values: &[f64], group: usize, panel: usize, block: &mut [f64]) {
+        let (g, n, kd) = (G, self.size, self.half_bandwidth);
         let (i0, j0) = (group * g, panel * g);
+        if group > panel && i0 + g <= n && i0 + g <= j0 + kd + 1 {
+            // All of it in the matrix and in the band.
+            for (c, column) in block.as_chunks_mut::<G>().0.iter_mut().enumerate() {
+                let at = (j0 + c) * kd + i0;
+                *column = *values[at..].first_chunk().expect("within the band");
+            }
+            return;
+        }
         for (c, column) in block.chunks_exact_mut(g).enumerate() {
             let j = j0 + c;
             let first = i0.max(j).min(i0 + g);
@@ -119,13 +132,11 @@ fn subtract_block<S: Simd, const R: usize, const C: usize, const G: usize>(
     let a = S::as_simd_f64s(a).0.as_chunks::<R>().0;
     let b = b.as_chunks::<G>().0;
     let target = S::as_mut_simd_f64s(target).0.as_chunks_mut::<R>().0;
-    for (a, b) in a.chunks(DEPTH).zip(b.chunks(DEPTH)) {
-        subtract_product::<S, R, C, G, 0>(simd, a, b, target);
-        subtract_product::<S, R, C, G, 1>(simd, a, b, target);
-        subtract_product::<S, R, C, G, 2>(simd, a, b, target);
-        if G == 4 * C {
-            subtract_product::<S, R, C, G, 3>(simd, a, b, target);
-        }
+    subtract_product::<S, R, C, G, 0>(simd, a, b, target);
+    subtract_product::<S, R, C, G, 1>(simd, a, b, target);
+    subtract_product::<S, R, C, G, 2>(simd, a, b, target);
+    if G == 4 * C {
+        subtract_product::<S, R, C, G, 3>(simd, a, b, target);
     }
 }
 
@@ -167,12 +178,14 @@ impl FactorDiagonal<'_> {
     ) -> Result<(), usize> {
         let Self { layout, values, shift, panel, group } = self;
         let (left, diagonal) = group.split_at_mut(layout.block(panel, panel));
-        layout.load(values, panel, panel, diagonal);
+        layout.load::<G>(values, panel, panel, diagonal);
         for c in 0..G.min(layout.size - panel * G) {
             diagonal[c * G + c] += shift[panel * G + c];
         }
         let left = &left[layout.block(panel, panel.saturating_sub(layout.blocks))..];
-        subtract_block::<S, R, C, G>(simd, left, left, diagonal);
+        for left in left.chunks(DEPTH * G) {
+            subtract_block::<S, R, C, G>(simd, left, left, diagonal);
+        }
         for c in 0..G {
             let (column, rest) = diagonal[c * G..].split_at_mut(G);
             let pivot = column[c];
@@ -211,15 +224,15 @@ fn bytemuck_view<S: Simd>(vector: &S::f64s) -> &[f64] {
     pulp::bytemuck::cast_slice(std::slice::from_ref(vector))
 }
 
-/// Forms the blocks of a panel below its diagonal: `X = (A − Σ L Lᵀ) D⁻ᵀ`.
+/// Forms the blocks of some panels in groups below them: `X = (A − Σ L Lᵀ) D⁻ᵀ`.
 pub(super) struct UpdateGroups<'s> {
     pub(super) layout: Layout,
     pub(super) values: &'s [f64],
-    pub(super) panel: usize,
+    pub(super) panels: Range<usize>,
+    /// The panels' own groups, factored.
+    pub(super) own: &'s [f64],
     /// Number of the first group of `groups`.
     pub(super) first: usize,
-    /// The panel's own group, factored.
-    pub(super) group: &'s [f64],
     pub(super) groups: &'s mut [f64],
 }
 
@@ -234,31 +247,57 @@ impl WithSimd for UpdateGroups<'_> {
 impl UpdateGroups<'_> {
     #[inline(always)]
     fn run<S: Simd, const R: usize, const C: usize, const G: usize>(self, simd: S) {
-        let Self { layout, values, panel, first, group: own, groups } = self;
-        let diagonal = own[layout.block(panel, panel)..].as_chunks::<G>().0;
+        let Self { layout, values, panels: all, own, first, groups } = self;
         for (k, group) in groups.chunks_exact_mut(layout.group_len()).enumerate() {
             let index = first + k;
             let start = index.saturating_sub(layout.blocks);
-            let (left, target) = group.split_at_mut(layout.block(index, panel));
-            let target = &mut target[..G * G];
-            layout.load(values, index, panel, target);
+            // The first panel may lie left of this group's band.
+            let panels = all.start.max(start)..all.end;
+            let own = &own[(panels.start - all.start) * layout.group_len()..];
+            let (left, targets) = group.split_at_mut(layout.block(index, panels.start));
             let left = &left[layout.block(index, start)..];
-            let right = &own[layout.block(panel, start)..layout.block(panel, panel)];
-            subtract_block::<S, R, C, G>(simd, left, right, target);
-            let columns = S::as_mut_simd_f64s(target).0.as_chunks_mut::<R>().0;
-            for c in 0..G {
-                let inverse = simd.splat_f64s(1.0 / diagonal[c][c]);
-                let (done, rest) = columns.split_at_mut(c + 1);
-                let x = &mut done[c];
-                for r in 0..R {
-                    x[r] = simd.mul_f64s(x[r], inverse);
+            for (target, panel) in targets.chunks_exact_mut(G * G).zip(panels.clone()) {
+                layout.load::<G>(values, index, panel, target);
+            }
+            for (depth, left) in left.chunks(DEPTH * G).enumerate() {
+                let own = own.chunks_exact(layout.group_len()).zip(panels.clone());
+                for (target, (own, panel)) in targets.chunks_exact_mut(G * G).zip(own) {
+                    let right = &own[layout.block(panel, start) + depth * DEPTH * G..];
+                    subtract_block::<S, R, C, G>(simd, left, &right[..left.len()], target);
                 }
-                for (other, &l) in rest.iter_mut().zip(&diagonal[c][c + 1..]) {
-                    let l = simd.splat_f64s(-l);
-                    for r in 0..R {
-                        other[r] = simd.mul_add_f64s(l, x[r], other[r]);
-                    }
-                }
+            }
+            for (p, own) in own.chunks_exact(layout.group_len()).take(panels.len()).enumerate() {
+                let panel = panels.start + p;
+                let (done, target) = targets.split_at_mut(p * G * G);
+                let target = &mut target[..G * G];
+                let right = &own[layout.block(panel, panels.start)..];
+                subtract_block::<S, R, C, G>(simd, done, &right[..done.len()], target);
+                let diagonal = own[layout.block(panel, panel)..].as_chunks::<G>().0;
+                solve_block::<S, R, G>(simd, diagonal, target);
+            }
+        }
+    }
+}
+
+/// `T ← T D⁻ᵀ` with `D` lower triangular.
+#[inline(always)]
+fn solve_block<S: Simd, const R: usize, const G: usize>(
+    simd: S,
+    diagonal: &[[f64; G]],
+    target: &mut [f64],
+) {
+    let columns = S::as_mut_simd_f64s(target).0.as_chunks_mut::<R>().0;
+    for c in 0..G {
+        let inverse = simd.splat_f64s(1.0 / diagonal[c][c]);
+        let (done, rest) = columns.split_at_mut(c + 1);
+        let x = &mut done[c];
+        for r in 0..R {
+            x[r] = simd.mul_f64s(x[r], inverse);
+        }
+        for (other, &l) in rest.iter_mut().zip(&diagonal[c][c + 1..]) {
+            let l = simd.splat_f64s(-l);
+            for r in 0..R {
+                other[r] = simd.mul_add_f64s(l, x[r], other[r]);
             }
         }
     }

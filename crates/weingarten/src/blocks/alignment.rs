@@ -5,7 +5,7 @@ use std::sync::Arc;
 use gp_solver::{Elements, ResidualBlock};
 use pulp::Simd;
 
-use super::rows::{SampleTerm, fill};
+use super::rows::{RowValues, SampleTerm, fill};
 use crate::field::{Sample, determinants_into};
 use crate::grid::{LaneKernel, SampleGrid, Scratch, load, store};
 use crate::kernel::{THIRD, alignment, curvature_jet};
@@ -65,41 +65,31 @@ pub(crate) fn padded(grid: &SampleGrid, values: impl Iterator<Item = f64>) -> Ve
     rows
 }
 
-struct Residual<'a> {
+struct Kernel<'a> {
     factors: &'a [f64],
-    residual: &'a mut [f64],
-}
-
-impl LaneKernel<THIRD> for Residual<'_> {
-    #[inline(always)]
-    fn run<S: Simd>(&mut self, simd: S, at: usize, d: &[Triple<Lanes<S>>; THIRD]) {
-        let jet = curvature_jet(d);
-        let r = jet.h_u * jet.k_v - jet.h_v * jet.k_u;
-        store(simd, self.residual, at, r * load(simd, self.factors, at));
-    }
-}
-
-struct Gradient<'a> {
-    factors: &'a [f64],
-    residual: &'a mut [f64],
-    gradient: &'a mut [f64],
+    values: RowValues<'a>,
     stride: usize,
 }
 
-impl LaneKernel<THIRD> for Gradient<'_> {
+impl LaneKernel<THIRD> for Kernel<'_> {
     #[inline(always)]
     fn run<S: Simd>(&mut self, simd: S, at: usize, d: &[Triple<Lanes<S>>; THIRD]) {
         let factor = load(simd, self.factors, at);
-        let (r, gradient) = alignment(d);
-        store(simd, self.residual, at, r * factor);
-        store_gradient(simd, self.gradient, self.stride, at, factor, &gradient);
+        if self.values.gradient.is_empty() {
+            let jet = curvature_jet(d);
+            let r = jet.h_u * jet.k_v - jet.h_v * jet.k_u;
+            store(self.values.residual, at, r * factor);
+        } else {
+            let (r, gradient) = alignment(d);
+            store(self.values.residual, at, r * factor);
+            store_gradient(self.values.gradient, self.stride, at, factor, &gradient);
+        }
     }
 }
 
 /// Writes `factor · gradient` as one padded row of samples per vector and axis.
 #[inline(always)]
 pub(crate) fn store_gradient<S: Simd, const N: usize>(
-    simd: S,
     out: &mut [f64],
     stride: usize,
     at: usize,
@@ -109,9 +99,9 @@ pub(crate) fn store_gradient<S: Simd, const N: usize>(
     for (rows, g) in out.chunks_exact_mut(3 * stride).zip(gradient) {
         let (x, rest) = rows.split_at_mut(stride);
         let (y, z) = rest.split_at_mut(stride);
-        store(simd, x, at, g.x * factor);
-        store(simd, y, at, g.y * factor);
-        store(simd, z, at, g.z * factor);
+        store(x, at, g.x * factor);
+        store(y, at, g.y * factor);
+        store(z, at, g.z * factor);
     }
 }
 
@@ -122,25 +112,11 @@ impl SampleTerm<THIRD> for Alignment {
         i: usize,
         unrolled: &[f64],
         scratch: &mut Scratch,
-        with_gradient: bool,
+        values: RowValues<'_>,
     ) {
         let stride = grid.stride();
         let factors = &self.factors[i * stride..(i + 1) * stride];
-        // Out of the scratch for the sweep, which needs the rest of it.
-        let mut residual = std::mem::take(&mut scratch.residual);
-        let mut gradient = std::mem::take(&mut scratch.gradient);
-        residual.resize(stride, 0.0);
-        if with_gradient {
-            gradient.resize(3 * THIRD * stride, 0.0);
-            let (residual, gradient) = (&mut residual[..], &mut gradient[..]);
-            let mut kernel = Gradient { factors, residual, gradient, stride };
-            grid.sweep(i, unrolled, scratch, &mut kernel);
-        } else {
-            let mut kernel = Residual { factors, residual: &mut residual };
-            grid.sweep(i, unrolled, scratch, &mut kernel);
-        }
-        scratch.residual = residual;
-        scratch.gradient = gradient;
+        grid.sweep(i, unrolled, scratch, &mut Kernel { factors, values, stride });
     }
 }
 

@@ -6,7 +6,7 @@ use gp_solver::{Elements, ResidualBlock};
 use pulp::Simd;
 
 use super::alignment::{SCALE_FLOOR, padded, store_gradient};
-use super::rows::{SampleTerm, fill};
+use super::rows::{RowValues, SampleTerm, fill};
 use crate::field::{Sample, parallel_gradients};
 use crate::grid::{LaneKernel, SampleGrid, Scratch, load, store};
 use crate::kernel::{FOURTH, Field, parallel, parallel_jet};
@@ -50,9 +50,7 @@ impl Parallel {
 struct Kernel<'a> {
     field: Field,
     factors: &'a [f64],
-    residual: &'a mut [f64],
-    /// Empty if not wanted.
-    gradient: &'a mut [f64],
+    values: RowValues<'a>,
     stride: usize,
 }
 
@@ -60,14 +58,14 @@ impl LaneKernel<FOURTH> for Kernel<'_> {
     #[inline(always)]
     fn run<S: Simd>(&mut self, simd: S, at: usize, d: &[Triple<Lanes<S>>; FOURTH]) {
         let factor = load(simd, self.factors, at);
-        if self.gradient.is_empty() {
+        if self.values.gradient.is_empty() {
             let jet = parallel_jet(self.field, d);
             let r = jet.psi_u * jet.f_v - jet.psi_v * jet.f_u;
-            store(simd, self.residual, at, r * factor);
+            store(self.values.residual, at, r * factor);
         } else {
             let (r, gradient) = parallel(self.field, d);
-            store(simd, self.residual, at, r * factor);
-            store_gradient(simd, self.gradient, self.stride, at, factor, &gradient);
+            store(self.values.residual, at, r * factor);
+            store_gradient(self.values.gradient, self.stride, at, factor, &gradient);
         }
     }
 }
@@ -79,24 +77,16 @@ impl SampleTerm<FOURTH> for Parallel {
         i: usize,
         unrolled: &[f64],
         scratch: &mut Scratch,
-        with_gradient: bool,
+        values: RowValues<'_>,
     ) {
         let stride = grid.stride();
         let factors = &self.factors[i * stride..(i + 1) * stride];
-        let mut residual = std::mem::take(&mut scratch.residual);
-        let mut gradient = std::mem::take(&mut scratch.gradient);
-        residual.resize(stride, 0.0);
-        gradient.resize(if with_gradient { 3 * FOURTH * stride } else { 0 }, 0.0);
-        let mut kernel = Kernel {
-            field: self.field,
-            factors,
-            residual: &mut residual,
-            gradient: &mut gradient,
-            stride,
-        };
-        grid.sweep(i, unrolled, scratch, &mut kernel);
-        scratch.residual = residual;
-        scratch.gradient = gradient;
+        grid.sweep(
+            i,
+            unrolled,
+            scratch,
+            &mut Kernel { field: self.field, factors, values, stride },
+        );
     }
 }
 

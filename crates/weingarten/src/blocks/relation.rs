@@ -6,7 +6,7 @@ use gp_solver::{Elements, ResidualBlock};
 use pulp::Simd;
 
 use super::alignment::store_gradient;
-use super::rows::{SampleTerm, fill};
+use super::rows::{RowValues, SampleTerm, fill};
 use crate::field::{Sample, samples};
 use crate::grid::{LaneKernel, SampleGrid, Scratch, load, store};
 use crate::kernel::{SECOND, curvature, second};
@@ -53,19 +53,20 @@ impl RelationRows {
 /// `α H + β K + γ`.
 struct Affine<'a> {
     coefficients: [&'a [f64]; 3],
-    residual: &'a mut [f64],
-    gradient: &'a mut [f64],
+    values: RowValues<'a>,
     stride: usize,
 }
 
 impl LaneKernel<SECOND> for Affine<'_> {
     #[inline(always)]
     fn run<S: Simd>(&mut self, simd: S, at: usize, d: &[Triple<Lanes<S>>; SECOND]) {
-        let [alpha, beta, gamma] = self.coefficients.map(|c| load(simd, c, at));
+        let [alpha, beta, gamma] = self.coefficients;
+        let (alpha, beta) = (load(simd, alpha, at), load(simd, beta, at));
+        let gamma = load(simd, gamma, at);
         let c = curvature(&second(d));
-        store(simd, self.residual, at, alpha.mul_add(c.h, beta.mul_add(c.k, gamma)));
-        if !self.gradient.is_empty() {
-            put(simd, self.gradient, self.stride, at, &c, alpha, beta);
+        store(self.values.residual, at, alpha.mul_add(c.h, beta.mul_add(c.k, gamma)));
+        if !self.values.gradient.is_empty() {
+            put(self.values.gradient, self.stride, at, &c, alpha, beta);
         }
     }
 }
@@ -75,23 +76,22 @@ struct Ratio<'a> {
     ratio: f64,
     scale: f64,
     smoothing: f64,
-    residual: &'a mut [f64],
-    gradient: &'a mut [f64],
+    values: RowValues<'a>,
     stride: usize,
 }
 
 impl LaneKernel<SECOND> for Ratio<'_> {
     #[inline(always)]
-    fn run<S: Simd>(&mut self, simd: S, at: usize, d: &[Triple<Lanes<S>>; SECOND]) {
+    fn run<S: Simd>(&mut self, _: S, at: usize, d: &[Triple<Lanes<S>>; SECOND]) {
         let c = curvature(&second(d));
         let smoothing = c.h.constant(self.smoothing);
         let root = (c.h.mul_add(c.h, smoothing * smoothing) - c.k).sqrt();
         let (minus, plus) = (self.scale * (1.0 - self.ratio), self.scale * (1.0 + self.ratio));
-        store(simd, self.residual, at, c.h.scale(minus) + root.scale(plus));
-        if !self.gradient.is_empty() {
+        store(self.values.residual, at, c.h.scale(minus) + root.scale(plus));
+        if !self.values.gradient.is_empty() {
             let by_root = root.recip().scale(plus);
             let alpha = by_root.mul_add(c.h, c.h.constant(minus));
-            put(simd, self.gradient, self.stride, at, &c, alpha, -by_root.scale(0.5));
+            put(self.values.gradient, self.stride, at, &c, alpha, -by_root.scale(0.5));
         }
     }
 }
@@ -99,7 +99,6 @@ impl LaneKernel<SECOND> for Ratio<'_> {
 /// Writes `α ∇H + β ∇K`.
 #[inline(always)]
 fn put<S: Simd>(
-    simd: S,
     out: &mut [f64],
     stride: usize,
     at: usize,
@@ -112,7 +111,7 @@ fn put<S: Simd>(
     for (i, slot) in gradient[1..].iter_mut().enumerate() {
         *slot = c.grad_h[i].scale(alpha).plus(beta, c.grad_k[i]);
     }
-    store_gradient(simd, out, stride, at, zero.constant(1.0), &gradient);
+    store_gradient(out, stride, at, zero.constant(1.0), &gradient);
 }
 
 impl SampleTerm<SECOND> for RelationRows {
@@ -122,26 +121,18 @@ impl SampleTerm<SECOND> for RelationRows {
         i: usize,
         unrolled: &[f64],
         scratch: &mut Scratch,
-        with_gradient: bool,
+        values: RowValues<'_>,
     ) {
         let stride = grid.stride();
-        let mut residual = std::mem::take(&mut scratch.residual);
-        let mut gradient = std::mem::take(&mut scratch.gradient);
-        residual.resize(stride, 0.0);
-        gradient.resize(if with_gradient { 3 * SECOND * stride } else { 0 }, 0.0);
-        let (r, g) = (&mut residual[..], &mut gradient[..]);
         if let Some((ratio, scale, smoothing)) = self.target.ratio() {
             let scale = self.weight * scale;
-            let mut kernel = Ratio { ratio, scale, smoothing, residual: r, gradient: g, stride };
+            let mut kernel = Ratio { ratio, scale, smoothing, values, stride };
             grid.sweep(i, unrolled, scratch, &mut kernel);
         } else {
             let rows = &self.coefficients[3 * i * stride..3 * (i + 1) * stride];
             let coefficients = std::array::from_fn(|k| &rows[k * stride..(k + 1) * stride]);
-            let mut kernel = Affine { coefficients, residual: r, gradient: g, stride };
-            grid.sweep(i, unrolled, scratch, &mut kernel);
+            grid.sweep(i, unrolled, scratch, &mut Affine { coefficients, values, stride });
         }
-        scratch.residual = residual;
-        scratch.gradient = gradient;
     }
 }
 

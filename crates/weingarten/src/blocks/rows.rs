@@ -6,18 +6,33 @@ use rayon::prelude::*;
 
 use crate::grid::{SampleGrid, Scratch, split_runs};
 
+/// Where the values of one row of samples go.
+pub(crate) struct RowValues<'a> {
+    /// One value per sample, padded.
+    pub(crate) residual: &'a mut [f64],
+    /// One padded row of samples per derivative vector and axis; empty if not wanted.
+    pub(crate) gradient: &'a mut [f64],
+}
+
 /// A quantity with one value per sample and its gradient by `N` derivative vectors.
 pub(crate) trait SampleTerm<const N: usize>: Sync {
-    /// Puts the values of row `i` of the samples into `scratch.residual` and, if asked for, the
-    /// gradients into `scratch.gradient`, one padded row of samples per vector and axis.
+    /// Evaluates row `i` of the samples.
     fn row(
         &self,
         grid: &SampleGrid,
         i: usize,
         unrolled: &[f64],
         scratch: &mut Scratch,
-        with_gradient: bool,
+        values: RowValues<'_>,
     );
+}
+
+/// Buffers of one worker.
+#[derive(Default)]
+struct Buffers {
+    scratch: Scratch,
+    residual: Vec<f64>,
+    gradient: Vec<f64>,
 }
 
 /// Fills residuals, and the Jacobian if given, of all elements of `grid`.
@@ -39,38 +54,39 @@ pub(crate) fn fill<const N: usize>(
         Some(values) => split_runs(sizes(columns), values).into_iter().map(Some).collect(),
         None => runs.iter().map(|_| None).collect(),
     };
-    let one_run = |scratch: &mut Scratch,
+    let stride = grid.stride();
+    let one_run = |buffers: &mut Buffers,
                    run: &std::ops::Range<usize>,
                    residuals: &mut [f64],
                    mut jacobian: Option<&mut [f64]>| {
+        let Buffers { scratch, residual, gradient } = buffers;
+        residual.resize(stride, 0.0);
+        gradient.resize(if jacobian.is_some() { 3 * N * stride } else { 0 }, 0.0);
         for i in run.clone() {
-            term.row(grid, i, &unrolled, scratch, jacobian.is_some());
+            term.row(grid, i, &unrolled, scratch, RowValues { residual, gradient });
             // Elements of this knot span row follow one another, each with rows i-major.
             let mut first = 0;
             for run_v in &grid.v.runs {
                 let row = first + (i - run.start) * run_v.len();
-                for (k, j) in run_v.clone().enumerate() {
-                    residuals[row + k] = scratch.residual[j];
-                    if let Some(values) = &mut jacobian {
-                        let out = &mut values[(row + k) * columns..(row + k + 1) * columns];
-                        grid.expand(i, j, N, &scratch.gradient, out);
-                    }
-                }
+                residuals[row..row + run_v.len()].copy_from_slice(&residual[run_v.clone()]);
                 first += run.len() * run_v.len();
+            }
+            if let Some(values) = &mut jacobian {
+                grid.expand_row(i, run, N, gradient, values);
             }
         }
     };
     let jobs = runs.iter().zip(residuals).zip(jacobians);
     if rayon::current_num_threads() == 1 {
-        let mut scratch = Scratch::default();
+        let mut buffers = Buffers::default();
         for ((run, residuals), jacobian) in jobs {
-            one_run(&mut scratch, run, residuals, jacobian);
+            one_run(&mut buffers, run, residuals, jacobian);
         }
     } else {
         let jobs: Vec<_> = jobs.collect();
         jobs.into_par_iter()
-            .for_each_init(Scratch::default, |scratch, ((run, residuals), jacobian)| {
-                one_run(scratch, run, residuals, jacobian)
+            .for_each_init(Buffers::default, |buffers, ((run, residuals), jacobian)| {
+                one_run(buffers, run, residuals, jacobian)
             });
     }
 }
