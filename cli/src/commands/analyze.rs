@@ -5,17 +5,27 @@ use crate::context::Context;
 use crate::failure::Failure;
 use crate::outcome::{Outcome, Status};
 use crate::report_support;
+use curvature_variation::{SurfaceAnalysis, fitted_torus};
 use exchange::{Mesh, Model};
 use geom_core::{CurvatureStatistics, ValueRange, mesh_curvature_statistics};
 use serde::Serialize;
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
+use subdiv_catmull_clark::Blend;
 
 /// Arguments of `analyze`.
 #[derive(Debug, clap::Args)]
-#[command(after_help = "Example: umbilic analyze fixtures/roof.ron --metrics roof.json")]
+#[command(after_help = "\
+Examples:
+  umbilic analyze fixtures/roof.ron --metrics roof.json
+  umbilic analyze fixtures/quads/clifford.obj --discrete-bending
+A mesh of quads is read as the control mesh of its Catmull-Clark surface.")]
 pub(crate) struct Analyze {
     /// File with surfaces or meshes; surfaces are preferred if it has both
     input: PathBuf,
+    /// Also the edge-based bending energy of the faces themselves, to compare with the surface's
+    #[arg(long)]
+    discrete_bending: bool,
     #[command(flatten)]
     report: ReportArgs,
 }
@@ -25,12 +35,18 @@ impl Analyze {
         self.report.check()?;
         let model =
             exchange::read_model(&self.input).map_err(|e| Failure::input(&self.input, e))?;
-        let (kind, statistics) = measure(&self.input, &model)?;
-        let mut outcome = Outcome::new(Status::Converged, 0)
-            .with_input(&self.input)
-            .with_metrics(&AnalyzeMetrics::new(kind, &statistics))?;
+        let Measured { kind, statistics, subdivision, warnings } = measure(&self.input, &model)?;
+        let mut metrics = AnalyzeMetrics::new(kind, &statistics);
+        metrics.subdivision = subdivision;
+        if self.discrete_bending {
+            metrics.discrete_bending = Some(discrete_energy(&self.input, &model)?);
+        }
+        let mut outcome =
+            Outcome::new(Status::Converged, 0).with_input(&self.input).with_metrics(&metrics)?;
         outcome.summary = summary(&self.input, &model, kind, &statistics);
+        outcome.summary.extend(energy_lines(&metrics));
         outcome.warnings.clone_from(&model.warnings);
+        outcome.warnings.extend(warnings);
         if statistics.singular > 0 {
             outcome.warnings.push(format!(
                 "{} of {} points are singular and have no curvature",
@@ -47,25 +63,51 @@ impl Analyze {
     }
 }
 
-fn measure(path: &Path, model: &Model) -> Result<(&'static str, CurvatureStatistics), Failure> {
-    let mut all = CurvatureStatistics::default();
+/// What an input is and what it measures.
+struct Measured {
+    kind: &'static str,
+    statistics: CurvatureStatistics,
+    subdivision: Option<SubdivisionMetrics>,
+    warnings: Vec<String>,
+}
+
+fn measure(path: &Path, model: &Model) -> Result<Measured, Failure> {
+    let mut statistics = CurvatureStatistics::default();
+    let (mut subdivision, mut warnings) = (None, Vec::new());
     if !model.surfaces.is_empty() {
         for named in &model.surfaces {
-            all.merge(&named.surface.curvature_statistics());
+            statistics.merge(&named.surface.curvature_statistics());
         }
         let rational = model.surfaces.iter().any(|named| named.surface.is_rational());
-        return Ok((if rational { "rational_bspline_surface" } else { "bspline_surface" }, all));
+        let kind = if rational { "rational_bspline_surface" } else { "bspline_surface" };
+        return Ok(Measured { kind, statistics, subdivision, warnings });
+    }
+    let with_faces: Vec<&Mesh> = model.meshes.iter().filter(|m| !m.faces.is_empty()).collect();
+    let corners = |n: usize| with_faces.iter().all(|m| m.faces.iter().all(|f| f.len() == n));
+    if let [mesh] = with_faces[..]
+        && corners(4)
+    {
+        let mesh = mesh.to_poly_mesh().map_err(|e| Failure::input(path, e))?;
+        match curvature_variation::analyze(&mesh, Blend::Smooth) {
+            Ok(found) => {
+                subdivision = Some(SubdivisionMetrics::new(&found));
+                let statistics = found.statistics;
+                let kind = "subdivision_surface";
+                return Ok(Measured { kind, statistics, subdivision, warnings });
+            }
+            Err(error) => warnings.push(format!(
+                "the mesh has no Catmull-Clark surface to measure, so its vertices are: {error}"
+            )),
+        }
     }
     let points = model.grids.iter().flat_map(|grid| &grid.points);
     points
         .chain(model.meshes.iter().flat_map(|mesh| &mesh.positions))
-        .for_each(|p| all.add_point(*p));
-    let with_faces: Vec<&Mesh> = model.meshes.iter().filter(|m| !m.faces.is_empty()).collect();
+        .for_each(|p| statistics.add_point(*p));
     for mesh in &with_faces {
         let mesh = mesh.to_poly_mesh().map_err(|e| Failure::input(path, e))?;
-        all.merge(&mesh_curvature_statistics(&mesh));
+        statistics.merge(&mesh_curvature_statistics(&mesh));
     }
-    let corners = |n: usize| with_faces.iter().all(|m| m.faces.iter().all(|f| f.len() == n));
     let has_lines = model.meshes.iter().any(|m| !m.lines.is_empty());
     let kind = match with_faces.as_slice() {
         [] if has_lines => "polylines",
@@ -75,7 +117,72 @@ fn measure(path: &Path, model: &Model) -> Result<(&'static str, CurvatureStatist
         _ if corners(3) => "triangle_mesh",
         _ => "polygon_mesh",
     };
-    Ok((kind, all))
+    Ok(Measured { kind, statistics, subdivision, warnings })
+}
+
+fn discrete_energy(path: &Path, model: &Model) -> Result<f64, Failure> {
+    let mut meshes = model.meshes.iter().filter(|m| !m.faces.is_empty()).peekable();
+    if !model.surfaces.is_empty() || meshes.peek().is_none() {
+        return Err(Failure::input(path, "--discrete-bending needs a mesh; this file has none"));
+    }
+    let energy = |m: &Mesh| m.to_poly_mesh().map(|m| curvature_variation::discrete_bending(&m));
+    let energies = meshes.map(energy).collect::<Result<Vec<f64>, _>>();
+    Ok(energies.map_err(|e| Failure::input(path, e))?.iter().sum())
+}
+
+/// What a subdivision surface measures beyond its curvatures.
+#[derive(Serialize)]
+struct SubdivisionMetrics {
+    energies: BTreeMap<&'static str, f64>,
+    quadrature_gap: f64,
+    gauss_bonnet_residual: Option<f64>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    torus_ratio: Option<f64>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    torus_fit_rms: Option<f64>,
+    patches: usize,
+}
+
+impl SubdivisionMetrics {
+    fn new(found: &SurfaceAnalysis) -> Self {
+        let torus = fitted_torus(&found.mesh, &found.surface);
+        Self {
+            energies: found.energies.by_name(),
+            quadrature_gap: found.quadrature_gap,
+            gauss_bonnet_residual: found.gauss_bonnet_residual,
+            torus_ratio: torus.map(|(torus, _)| torus.ratio()),
+            torus_fit_rms: torus.map(|(_, rms)| rms),
+            patches: found.mesh.face_count(),
+        }
+    }
+}
+
+fn energy_lines(metrics: &AnalyzeMetrics) -> Vec<String> {
+    let mut lines = Vec::new();
+    if let Some(subdivision) = &metrics.subdivision {
+        let value = |name: &str| subdivision.energies[name];
+        lines.push(format!(
+            "  bending {:.4}, Willmore {:.4}, SI-Mehlum-Tarrou {:.4}, SI-MVScross {:.4}, SI-MVS {:.4}",
+            value("bending"),
+            value("willmore"),
+            value("mehlum_tarrou"),
+            value("mvs_cross"),
+            value("mvs")
+        ));
+        let mut checks = format!("  quadrature gap {:.1e}", subdivision.quadrature_gap);
+        if let Some(residual) = subdivision.gauss_bonnet_residual {
+            checks += &format!(", Gauss-Bonnet residual {residual:.1e}");
+        }
+        lines.push(checks);
+        if let (Some(ratio), Some(rms)) = (subdivision.torus_ratio, subdivision.torus_fit_rms) {
+            lines
+                .push(format!("  nearest torus has radius ratio {ratio:.4}, off by {rms:.1e} rms"));
+        }
+    }
+    if let Some(energy) = metrics.discrete_bending {
+        lines.push(format!("  discrete bending of the faces {energy:.4}"));
+    }
+    lines
 }
 
 /// The `metrics` object; curvatures are null where there is no surface.
@@ -94,6 +201,10 @@ struct AnalyzeMetrics {
     principal_curvature_max: Option<f64>,
     principal_curvature_mean_abs: Option<f64>,
     singular_points: usize,
+    #[serde(flatten)]
+    subdivision: Option<SubdivisionMetrics>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    discrete_bending: Option<f64>,
 }
 
 impl AnalyzeMetrics {
@@ -117,6 +228,8 @@ impl AnalyzeMetrics {
             principal_curvature_max: principal.map(|r| r.max),
             principal_curvature_mean_abs: principal.map(|r| r.mean_abs),
             singular_points: statistics.singular,
+            subdivision: None,
+            discrete_bending: None,
         }
     }
 }

@@ -8,8 +8,8 @@ use crate::outcome::{Outcome, Status};
 use crate::report_support;
 use bspline::{BsplineSurface, Degree, KnotVector};
 use curvature_variation::{
-    Constraints, Energy, FairOptions, FairReport, Fairing, Functional, Method, Quadrature,
-    SurfaceSamples, SymmetryMode, fair,
+    Constraints, Energy, FairOptions, FairProgress, FairReport, Fairing, Functional, Method,
+    Quadrature, SurfaceSamples, SymmetryMode, fair, fair_in_family, fitted_torus,
 };
 use exchange::{Field, LengthUnit, Mesh, Model, NamedSurface};
 use geom_core::{DVec3, UmbilicKind};
@@ -69,12 +69,25 @@ struct Settings {
     /// Fixed vertices, pinned limit points and tangent planes
     #[arg(long, value_name = "FILE.ron")]
     fix: Option<PathBuf>,
+    /// Stay among the blends of the input and this mesh of the same faces; repeatable
+    #[arg(long, value_name = "QUADS")]
+    family: Option<Vec<PathBuf>>,
     /// Symmetries to keep: auto, none, or a RON file with matrices [default: auto]
     #[arg(long, value_name = "auto|none|FILE.ron")]
     symmetry: Option<String>,
 }
 
-layered!(Settings { energy, levels, iterations, method, blend, clamp_boundary, fix, symmetry });
+layered!(Settings {
+    energy,
+    levels,
+    iterations,
+    method,
+    blend,
+    clamp_boundary,
+    fix,
+    family,
+    symmetry
+});
 
 #[derive(Clone, Copy, Debug, clap::ValueEnum, Deserialize)]
 #[serde(rename_all = "kebab-case")]
@@ -96,16 +109,30 @@ impl Fair {
     pub(crate) fn run(self, context: &Context) -> Result<Outcome, Failure> {
         self.output.check()?;
         self.report.check()?;
-        let (options, constraints) = self.settings.over(self.config.load()?).resolve()?;
+        let settings = self.settings.over(self.config.load()?);
+        let family = settings.family.clone().unwrap_or_default();
+        let (options, constraints) = settings.resolve()?;
+        if !family.is_empty() && !constraints.is_empty() {
+            return Err(Failure::usage(
+                "--family leaves no vertex to fix; drop --fix and --clamp-boundary",
+            ));
+        }
         let model =
             exchange::read_model(&self.input).map_err(|e| Failure::input(&self.input, e))?;
         let mesh = read_control_mesh(&self.input, &model)?;
         let bar = context.progress("fairing", (options.levels + 1) * options.iterations);
-        let result = fair(&mesh, &Creases::none(), &constraints, &options, |p| {
+        let mut observer = |p: &FairProgress| {
             let done = p.level * options.iterations + p.iteration;
             bar.at(done, format!("{} vertices, energy {:.4}", p.vertices, p.energy));
             if context.interrupted() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
-        })
+        };
+        let result = if family.is_empty() {
+            fair(&mesh, &Creases::none(), &constraints, &options, &mut observer)
+        } else {
+            let members =
+                family.iter().map(|path| read_member(path)).collect::<Result<Vec<_>, _>>()?;
+            fair_in_family(&mesh, &members, &options, &mut observer)
+        }
         .map_err(|e| Failure::input(&self.input, e))?;
         drop(bar);
         let mut outcome = Outcome::new(status(result.report.status), result.report.iterations)
@@ -198,6 +225,12 @@ fn read_control_mesh(path: &Path, model: &Model) -> Result<geom_core::PolyMesh, 
     }
 }
 
+/// A further mesh of `--family`.
+fn read_member(path: &Path) -> Result<geom_core::PolyMesh, Failure> {
+    let model = exchange::read_model(path).map_err(|e| Failure::input(path, e))?;
+    read_control_mesh(path, &model)
+}
+
 fn status(status: gp_solver::Status) -> Status {
     match status {
         gp_solver::Status::Converged => Status::Converged,
@@ -217,6 +250,10 @@ struct MetricsObject {
     energy_initial: f64,
     energy_final: f64,
     gradient_norm: f64,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    torus_ratio: Option<f64>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    torus_fit_rms: Option<f64>,
     vertices: usize,
     patches: usize,
     ms_per_gradient: f64,
@@ -227,8 +264,11 @@ impl MetricsObject {
     fn new(result: &Fairing) -> Self {
         let FairReport { after, quadrature_gap, energy_initial, energy_final, .. } = &result.report;
         let residual = result.report.gauss_bonnet_residual;
+        let torus = fitted_torus(&result.mesh, &result.surface);
         Self {
-            energies: after.iter().map(|(f, value)| (f.name(), value)).collect(),
+            energies: after.by_name(),
+            torus_ratio: torus.map(|(torus, _)| torus.ratio()),
+            torus_fit_rms: torus.map(|(_, rms)| rms),
             quadrature_gap: *quadrature_gap,
             gauss_bonnet_residual: residual.is_finite().then_some(residual),
             energy_initial: *energy_initial,
@@ -293,6 +333,10 @@ fn summary(result: &Fairing, options: &FairOptions) -> Vec<String> {
     ));
     if report.gauss_bonnet_residual.is_finite() {
         lines.push(format!("  Gauss-Bonnet residual {:.1e}", report.gauss_bonnet_residual));
+    }
+    if let Some((torus, rms)) = fitted_torus(&result.mesh, &result.surface) {
+        let ratio = torus.ratio();
+        lines.push(format!("  nearest torus has radius ratio {ratio:.4}, off by {rms:.1e} rms"));
     }
     lines
 }

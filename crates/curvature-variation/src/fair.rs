@@ -101,6 +101,8 @@ pub enum FairError {
         "--levels {levels} would make about {vertices} vertices; at most {limit} are supported"
     )]
     TooManyLevels { levels: usize, vertices: usize, limit: usize },
+    #[error("mesh {member} of the family has other faces than the input; move its vertices only")]
+    OtherFaces { member: usize },
     #[error(transparent)]
     Mesh(#[from] MeshError),
     #[error(transparent)]
@@ -280,34 +282,49 @@ pub fn fair(
         levels.push(report);
     }
     let surface = SubdivisionSurface::new(&mesh, &creases, options.blend)?;
-    let coarse = energies(&mesh, &surface, constraints, options.quadrature);
-    let after = energies(&mesh, &surface, constraints, Quadrature::FINE);
+    let report = finished(&mesh, &surface, constraints, options, before, levels, gradient_norm);
+    Ok(Fairing { initial, mesh, creases, surface, report })
+}
+
+/// The report of a minimisation: all energies of the result, and what checks them.
+pub(crate) fn finished(
+    mesh: &PolyMesh,
+    surface: &SubdivisionSurface,
+    constraints: &Constraints,
+    options: &FairOptions,
+    before: EnergyTable,
+    levels: Vec<LevelReport>,
+    gradient_norm: f64,
+) -> FairReport {
+    let coarse = energies(mesh, surface, constraints, options.quadrature);
+    let after = energies(mesh, surface, constraints, Quadrature::FINE);
     let energy_final = after.total(&options.energy);
     let difference = (coarse.total(&options.energy) - energy_final).abs();
-    let gap = if difference == 0.0 { 0.0 } else { difference / energy_final.abs() };
-    let last = levels.last().ok_or(FairError::NoEnergy)?;
+    let quadrature_gap = if difference == 0.0 { 0.0 } else { difference / energy_final.abs() };
+    let status = levels.last().map_or(Status::Interrupted, |l| l.status);
     let extrapolated = match &levels[..] {
-        [.., a, b] if !interrupted => Some(energy_final - (a.final_energy - b.final_energy) / 3.0),
+        [.., a, b] if status != Status::Interrupted => {
+            Some(energy_final - (a.final_energy - b.final_energy) / 3.0)
+        }
         _ => None,
     };
-    let report = FairReport {
-        status: last.status,
+    FairReport {
+        status,
         iterations: levels.iter().map(|l| l.iterations).sum(),
         energy_initial: before.total(&options.energy),
         energy_final,
-        quadrature_gap: gap,
-        gauss_bonnet_residual: gauss_bonnet_residual(&mesh, &surface),
+        quadrature_gap,
+        gauss_bonnet_residual: gauss_bonnet_residual(mesh, surface),
         gradient_norm,
-        seconds_per_gradient: time_gradient(&mesh, &surface, options),
+        seconds_per_gradient: time_gradient(mesh, surface, options),
         extrapolated,
         before,
         after,
         levels,
-    };
-    Ok(Fairing { initial, mesh, creases, surface, report })
+    }
 }
 
-fn check_input(
+pub(crate) fn check_input(
     mesh: &PolyMesh,
     constraints: &Constraints,
     options: &FairOptions,
@@ -459,7 +476,7 @@ fn skip_boundary(mesh: &PolyMesh, multiplicities: &mut [u32]) {
     }
 }
 
-fn energies(
+pub(crate) fn energies(
     mesh: &PolyMesh,
     surface: &SubdivisionSurface,
     constraints: &Constraints,
@@ -486,7 +503,7 @@ fn time_gradient(mesh: &PolyMesh, surface: &SubdivisionSurface, options: &FairOp
 }
 
 /// `|∫K dA − 2πχ| / ∫|K| dA` by the fine quadrature; NaN for an open surface.
-fn gauss_bonnet_residual(mesh: &PolyMesh, surface: &SubdivisionSurface) -> f64 {
+pub(crate) fn gauss_bonnet_residual(mesh: &PolyMesh, surface: &SubdivisionSurface) -> f64 {
     if !mesh.boundary_loops().is_empty() {
         return f64::NAN;
     }

@@ -21,12 +21,15 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
+mod analysis;
 mod constraints;
 mod density;
 mod descent;
+mod discrete;
 mod evaluator;
 mod expression;
 mod fair;
+mod family;
 mod freedom;
 mod functional;
 mod kernel;
@@ -36,13 +39,16 @@ mod rules;
 mod samples;
 mod symmetry;
 
+pub use analysis::{SurfaceAnalysis, analyze, fitted_torus};
 pub use constraints::Constraints;
 pub use descent::Method;
+pub use discrete::discrete_bending;
 pub use evaluator::{EnergyTable, SurfaceEnergy, Workspace};
 pub use expression::ExpressionError;
 pub use fair::{
     FairError, FairOptions, FairProgress, FairReport, Fairing, LevelReport, SymmetryMode, fair,
 };
+pub use family::fair_in_family;
 pub use functional::{Energy, Functional};
 pub use rules::Quadrature;
 pub use samples::{SurfaceSamples, Umbilic};

@@ -123,7 +123,8 @@ impl SurfaceSamples {
     }
 }
 
-fn jet_at(
+/// The jet at a point of a patch, next to an extraordinary corner for the corner itself.
+pub(crate) fn jet_at(
     mesh: &PolyMesh,
     surface: &SubdivisionSurface,
     patch: &Patch,

@@ -26,31 +26,28 @@ fn refusal(mesh: &PolyMesh, constraints: &Constraints, options: &FairOptions) ->
 #[test]
 fn an_ellipsoid_becomes_a_sphere() {
     let mesh = quad_graphs::ellipsoid(4, DVec3::new(1.0, 1.2, 1.6));
-    let result = run(&mesh, &Constraints::default(), &options("f3 + f1", 1));
+    let result = run(&mesh, &Constraints::default(), &options("mehlum_tarrou", 2));
     let table = &result.report.after;
-    assert!((table.get(Functional::Bending) / (8.0 * PI) - 1.0).abs() < 1e-3);
+    assert!((table.get(Functional::Bending) / (8.0 * PI) - 1.0).abs() < 1e-4);
     assert!(result.report.gauss_bonnet_residual < 2e-4);
-}
-
-#[test]
-fn bending_minimiser_of_genus_one_is_the_clifford_torus() {
-    let mesh = quad_graphs::torus(16, 8, 1.0, 0.4);
-    let result = run(&mesh, &Constraints::default(), &options("bending", 1));
-    assert!((result.report.energy_final / (8.0 * PI * PI) - 1.0).abs() < 2e-4);
     let frames = limit_frames(&result.mesh, &result.surface);
-    let points: Vec<f64> = frames
-        .iter()
-        .flatten()
-        .map(|f| f.point(result.mesh.positions()))
-        .map(|p| p.x.hypot(p.y))
-        .collect();
-    let (mut inner, mut outer) = (f64::INFINITY, 0.0_f64);
-    for r in points {
-        inner = inner.min(r);
-        outer = outer.max(r);
+    let points: Vec<DVec3> =
+        frames.iter().flatten().map(|f| f.point(result.mesh.positions())).collect();
+    let centre = points.iter().copied().sum::<DVec3>() / points.len() as f64;
+    let radii = points.iter().map(|p| p.distance(centre));
+    let (least, most) = radii.fold((f64::INFINITY, 0.0_f64), |(a, b), r| (a.min(r), b.max(r)));
+    assert!(most / least - 1.0 < 2e-3, "radii from {least} to {most}");
+    // What is left of the third-order energies, a few thousandths of those of the ellipsoid or of
+    // a surface of genus 2, sits at the eight vertices of valence 3.
+    for (functional, bound) in [
+        (Functional::F1, 3.2),
+        (Functional::F3, 0.4),
+        (Functional::MvsCross, 9.0),
+        (Functional::Mvs, 8.0),
+    ] {
+        assert!(table.get(functional) < bound, "{functional}: {}", table.get(functional));
     }
-    let ratio = (outer - inner) / (outer + inner);
-    assert!((ratio - std::f64::consts::FRAC_1_SQRT_2).abs() < 2e-3, "{ratio}");
+    assert!(result.report.energy_final < 3.5, "{}", result.report.energy_final);
 }
 
 #[test]

@@ -15,6 +15,7 @@ mod mesh_curvature;
 mod poly_mesh;
 mod quad_grid;
 mod third_order;
+mod torus_fit;
 mod tri_mesh;
 
 pub use bounding_box::BoundingBox;
@@ -34,4 +35,5 @@ pub use mesh_curvature::{VertexCurvature, mesh_curvature_statistics, vertex_curv
 pub use poly_mesh::{FaceId, HalfEdgeId, MeshError, PolyMesh, VertexId};
 pub use quad_grid::{GridError, QuadGrid};
 pub use third_order::{ThirdOrder, UmbilicKind};
+pub use torus_fit::Torus;
 pub use tri_mesh::{ClosestPoint, Foot, Nearest, TriMesh, closest_barycentric, closest_on_segment};

@@ -1,0 +1,145 @@
+//! A subdivision surface measured as it is: curvatures, energies, checks.
+
+use crate::constraints::Constraints;
+use crate::evaluator::EnergyTable;
+use crate::fair::{energies, gauss_bonnet_residual};
+use crate::functional::Functional;
+use crate::rules::{Quadrature, gauss_legendre};
+use crate::samples::jet_at;
+use geom_core::{CurvatureStatistics, DVec3, PolyMesh, Torus};
+use rayon::prelude::*;
+use std::collections::BTreeMap;
+use subdiv_catmull_clark::{
+    Blend, Creases, Patch, SubdivisionError, SubdivisionSurface, limit_frames, refine,
+    refinements_needed,
+};
+
+/// Gauss points per side of a patch for the mean sizes of curvatures.
+const SAMPLES: usize = 6;
+
+/// What [`analyze`] found.
+#[derive(Clone, Debug)]
+pub struct SurfaceAnalysis {
+    /// The mesh refined to quads with regular rings around extraordinary vertices, if it needed
+    /// that: the patches' control mesh.
+    pub mesh: PolyMesh,
+    /// Its surface.
+    pub surface: SubdivisionSurface,
+    /// Area, extent and curvatures of the limit surface.
+    pub statistics: CurvatureStatistics,
+    /// All functionals by the fine quadrature.
+    pub energies: EnergyTable,
+    /// Largest relative difference to the normal quadrature among bending and the Mehlum-Tarrou
+    /// energy.
+    pub quadrature_gap: f64,
+    /// `|∫K − 2πχ| / ∫|K|`, `None` for an open surface.
+    pub gauss_bonnet_residual: Option<f64>,
+}
+
+impl EnergyTable {
+    /// All values under the names of their functionals.
+    #[must_use]
+    pub fn by_name(&self) -> BTreeMap<&'static str, f64> {
+        self.iter().map(|(functional, value)| (functional.name(), value)).collect()
+    }
+}
+
+/// Measures the Catmull-Clark limit surface of a mesh of quads or n-gons.
+///
+/// Curvatures are sampled at 6×6 Gauss points and the corners of every patch, so that extremes are
+/// those of the samples.
+///
+/// # Errors
+/// [`SubdivisionError`] if the surface cannot be evaluated.
+///
+/// # Example
+/// ```
+/// use curvature_variation::{Functional, analyze};
+/// let mesh = fixtures::quad_graphs::torus(32, 24, 1.0, 0.5);
+/// let found = analyze(&mesh, subdiv_catmull_clark::Blend::Smooth)?;
+/// // π² / (ρ √(1 − ρ²)) for the ratio ρ of the radii.
+/// let willmore = std::f64::consts::PI.powi(2) / (0.5 * 0.75_f64.sqrt());
+/// assert!((found.energies.get(Functional::Willmore) / willmore - 1.0).abs() < 1e-4);
+/// let range = found.statistics.gaussian_curvature().unwrap();
+/// assert!((range.min + 4.0).abs() < 0.02 && (range.max - 4.0 / 3.0).abs() < 0.02);
+/// # Ok::<(), subdiv_catmull_clark::SubdivisionError>(())
+/// ```
+pub fn analyze(mesh: &PolyMesh, blend: Blend) -> Result<SurfaceAnalysis, SubdivisionError> {
+    let mut mesh = mesh.clone();
+    for _ in 0..refinements_needed(&mesh, &Creases::none()) {
+        // Fails for meshes too large to count only, which the caller's mesh already passed.
+        match refine(&mesh, &Creases::none()) {
+            Ok(fine) => mesh = fine.mesh,
+            Err(_) => break,
+        }
+    }
+    let surface = SubdivisionSurface::new(&mesh, &Creases::none(), blend)?;
+    let free = Constraints::default();
+    let fine = energies(&mesh, &surface, &free, Quadrature::FINE);
+    let normal = energies(&mesh, &surface, &free, Quadrature::NORMAL);
+    let gap = [Functional::Bending, Functional::MehlumTarrou { w1: 1.0, w3: 1.0 }]
+        .map(|f| (normal.get(f) - fine.get(f)).abs() / fine.get(f).abs().max(f64::MIN_POSITIVE));
+    let residual = gauss_bonnet_residual(&mesh, &surface);
+    Ok(SurfaceAnalysis {
+        statistics: statistics(&mesh, &surface),
+        energies: fine,
+        quadrature_gap: gap[0].max(gap[1]),
+        gauss_bonnet_residual: residual.is_finite().then_some(residual),
+        mesh,
+        surface,
+    })
+}
+
+/// The torus nearest to the limit points of a closed surface of genus 1, with the root mean square
+/// of the distances; `None` for any other surface.
+#[must_use]
+pub fn fitted_torus(mesh: &PolyMesh, surface: &SubdivisionSurface) -> Option<(Torus, f64)> {
+    if mesh.euler_characteristic() != 0 || !mesh.boundary_loops().is_empty() {
+        return None;
+    }
+    let frames = limit_frames(mesh, surface);
+    let points: Vec<DVec3> = frames.iter().flatten().map(|f| f.point(mesh.positions())).collect();
+    Torus::fit(&points)
+}
+
+fn statistics(mesh: &PolyMesh, surface: &SubdivisionSurface) -> CurvatureStatistics {
+    let rule = gauss_legendre(SAMPLES);
+    let mut parameters: Vec<(f64, f64, f64)> = Vec::new();
+    for &(u, wu) in &rule {
+        parameters.extend(rule.iter().map(|&(v, wv)| (u, v, wu * wv)));
+    }
+    parameters.extend([(0.0, 0.0, 0.0), (1.0, 0.0, 0.0), (1.0, 1.0, 0.0), (0.0, 1.0, 0.0)]);
+    let parts: Vec<CurvatureStatistics> = surface
+        .patches()
+        .par_iter()
+        .with_min_len(16)
+        .map(|patch| patch_statistics(mesh, surface, patch, &parameters))
+        .collect();
+    let mut all = CurvatureStatistics::default();
+    parts.iter().for_each(|part| all.merge(part));
+    all
+}
+
+fn patch_statistics(
+    mesh: &PolyMesh,
+    surface: &SubdivisionSurface,
+    patch: &Patch,
+    parameters: &[(f64, f64, f64)],
+) -> CurvatureStatistics {
+    let mut out = CurvatureStatistics::default();
+    for &(u, v, weight) in parameters {
+        let jet = jet_at(mesh, surface, patch, u, v);
+        let first = jet.first_form();
+        let area = weight * (first.e * first.g - first.f * first.f).max(0.0).sqrt();
+        out.add_area(area);
+        let curvatures = jet.second_form().and_then(|second| {
+            let mean = geom_core::mean_curvature(first, second)?;
+            Ok((mean, geom_core::gaussian_curvature(first, second)?))
+        });
+        match curvatures {
+            Ok((h, k)) => out.add(jet.position(), area, h, k),
+            Err(_) => out.add_singular(jet.position()),
+        }
+    }
+    out
+}
