@@ -3,6 +3,8 @@
 
 mod bench;
 mod ci;
+mod dist;
+mod fuzz;
 mod judges;
 mod regress;
 mod scene;
@@ -20,6 +22,8 @@ cargo xtask <chore>
   regress --bless NAME     rewrite the CloseTo values of one scene (never a bound)
   judges                   let independent programs read what we write, where they are installed
   bench [PACKAGE…]         run the benches and record them in docs/benchmarks.md
+  dist                     man pages and shell completions into target/dist
+  fuzz SECONDS [TARGET…]   fuzz the readers and the solver, each for so long
   bench --proof            run the solver on the public test sets, write docs/solver-proof.md
 ";
 
@@ -33,6 +37,8 @@ fn main() -> ExitCode {
         ["regress", names @ ..] => regress::run(names).map(|_| ()),
         ["judges"] => judges::run(),
         ["bench", "--proof"] => bench::proof(),
+        ["dist"] => dist::run(),
+        ["fuzz", seconds, targets @ ..] => fuzz::run(seconds, targets),
         ["bench", packages @ ..] => bench::run(packages),
         _ => {
             println!("{HELP}");

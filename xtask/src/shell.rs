@@ -24,12 +24,16 @@ pub(crate) fn build_umbilic() -> Outcome {
     check(cargo(&["test", "--workspace", "--no-run", "--quiet"]))
 }
 
+/// Where cargo builds.
+pub(crate) fn target() -> PathBuf {
+    std::env::var_os("CARGO_TARGET_DIR").map_or_else(|| root().join("target"), PathBuf::from)
+}
+
 /// The command line tool as the last `cargo build` left it, in the workspace root.
 pub(crate) fn umbilic() -> Command {
-    let target =
-        std::env::var_os("CARGO_TARGET_DIR").map_or_else(|| root().join("target"), PathBuf::from);
-    let mut command =
-        Command::new(target.join("debug").join(format!("umbilic{}", std::env::consts::EXE_SUFFIX)));
+    let mut command = Command::new(
+        target().join("debug").join(format!("umbilic{}", std::env::consts::EXE_SUFFIX)),
+    );
     command.current_dir(root());
     command
 }

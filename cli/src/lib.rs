@@ -1,0 +1,112 @@
+//! The `umbilic` command: it parses, reads, calls one library function, writes and prints.
+//!
+//! A library only so that man pages and shell completions can be made from [`command`]
+//! (`cargo xtask dist`).
+#![allow(clippy::print_stdout, reason = "a command line tool prints")]
+
+mod args;
+mod commands;
+mod config;
+mod context;
+mod failure;
+mod net_files;
+mod net_report;
+mod outcome;
+mod panel_files;
+mod report_support;
+
+use clap::{CommandFactory, Parser};
+use context::Context;
+use failure::{DEFECT, Failure, INTERRUPTED, NOT_CONVERGED, OK, USAGE};
+use outcome::{Outcome, Status};
+use std::io::Write;
+use std::process::ExitCode;
+use std::time::Instant;
+
+/// Design surfaces that can be built.
+#[derive(Debug, Parser)]
+#[command(name = "umbilic", version, about, arg_required_else_help = true)]
+struct Cli {
+    #[command(flatten)]
+    global: args::GlobalArgs,
+    #[command(subcommand)]
+    command: commands::Command,
+}
+
+/// The command line as clap knows it.
+#[must_use]
+pub fn command() -> clap::Command {
+    Cli::command()
+}
+
+/// Runs the program with the arguments of this process; the exit codes are those of the README.
+#[must_use]
+pub fn main() -> ExitCode {
+    // A panic is a defect of ours: it ends with one sentence and exit code 1, never with a trace.
+    std::panic::set_hook(Box::new(|info| {
+        let place = info.location().map(|l| format!(" at {}:{}", l.file(), l.line()));
+        let what = info.payload_as_str().unwrap_or("no message");
+        say(&format!("internal error{}: {what}; please report this", place.unwrap_or_default()));
+    }));
+    let code = std::panic::catch_unwind(start).unwrap_or(DEFECT);
+    ExitCode::from(code)
+}
+
+fn start() -> u8 {
+    let cli = match Cli::try_parse() {
+        Ok(cli) => cli,
+        Err(error) => {
+            // `--help` and `--version` come here too; clap prints them to stdout.
+            let _ = error.print();
+            return if error.use_stderr() { USAGE } else { OK };
+        }
+    };
+    let result =
+        Context::new(&cli.global).and_then(|context| run(&cli.global, &context, cli.command));
+    result.unwrap_or_else(|failure| {
+        say(&failure.to_string());
+        failure.code()
+    })
+}
+
+fn run(
+    global: &args::GlobalArgs,
+    context: &Context,
+    command: commands::Command,
+) -> Result<u8, Failure> {
+    let begin = Instant::now();
+    if let Some(path) = &global.metrics {
+        args::check_output_path(path)?;
+    }
+    let name = command.name();
+    let outcome = command.run(context)?;
+    for warning in &outcome.warnings {
+        say(&format!("warning: {warning}"));
+    }
+    let metrics = global.metrics.as_ref().map(|path| {
+        (path.clone(), outcome.metrics_file(name, begin.elapsed().as_secs_f64(), context.threads))
+    });
+    outcome.write_files(metrics)?;
+    if !global.quiet {
+        let mut out = std::io::stdout().lock();
+        for line in &outcome.summary {
+            // A closed pipe (`umbilic … | head`) is the reader's choice, not an error.
+            let _ = writeln!(out, "{line}");
+        }
+    }
+    Ok(exit_code(&outcome))
+}
+
+fn exit_code(outcome: &Outcome) -> u8 {
+    match outcome.status {
+        Status::Interrupted => INTERRUPTED,
+        Status::Converged => OK,
+        _ if outcome.require_converged => NOT_CONVERGED,
+        _ => OK,
+    }
+}
+
+/// One line on stderr, in the name of the program.
+fn say(message: &str) {
+    let _ = writeln!(std::io::stderr().lock(), "umbilic: {message}");
+}
