@@ -14,6 +14,9 @@ pub(crate) struct Context {
     pub(crate) threads: usize,
     quiet: bool,
     interrupt: Arc<AtomicBool>,
+    /// Whether somebody will act on the interrupt flag: a solver that asks for it between steps,
+    /// or `main` while it writes.
+    heeded: Arc<AtomicBool>,
 }
 
 impl Context {
@@ -26,22 +29,31 @@ impl Context {
         }
         pool.build_global().map_err(|e| Failure::other(format!("cannot start threads: {e}")))?;
         let interrupt = Arc::new(AtomicBool::new(false));
-        let flag = Arc::clone(&interrupt);
-        // The first Ctrl-C asks the solver to stop and write its checkpoint, the second one ends.
+        let heeded = Arc::new(AtomicBool::new(false));
+        let (flag, listener) = (Arc::clone(&interrupt), Arc::clone(&heeded));
+        // The first Ctrl-C asks the solver to stop and write its checkpoint, the second one ends;
+        // so does the first one where no solver has begun to ask, for nothing is written yet.
         let handler = move || {
-            if flag.swap(true, Ordering::SeqCst) {
+            if flag.swap(true, Ordering::SeqCst) || !listener.load(Ordering::SeqCst) {
                 std::process::exit(i32::from(INTERRUPTED));
             }
         };
         ctrlc::set_handler(handler)
             .map_err(|e| Failure::other(format!("cannot listen for Ctrl-C: {e}")))?;
-        Ok(Self { threads: rayon::current_num_threads(), quiet: global.quiet, interrupt })
+        Ok(Self { threads: rayon::current_num_threads(), quiet: global.quiet, interrupt, heeded })
     }
 
     /// Whether the user pressed Ctrl-C: the callback of every solver asks.
     #[allow(dead_code, reason = "used by the solving commands")]
     pub(crate) fn interrupted(&self) -> bool {
+        self.heeded.store(true, Ordering::SeqCst);
         self.interrupt.load(Ordering::SeqCst)
+    }
+
+    /// From here on Ctrl-C waits until the files are written, which takes a moment only; then no
+    /// temporary file is left behind.
+    pub(crate) fn begin_writing(&self) {
+        self.heeded.store(true, Ordering::SeqCst);
     }
 
     /// A progress bar of `steps` steps on stderr; invisible unless stderr is a terminal.

@@ -86,6 +86,7 @@ fn run(
     let metrics = global.metrics.as_ref().map(|path| {
         (path.clone(), outcome.metrics_file(name, begin.elapsed().as_secs_f64(), context.threads))
     });
+    context.begin_writing();
     outcome.write_files(metrics)?;
     if !global.quiet {
         let mut out = std::io::stdout().lock();

@@ -67,28 +67,50 @@ fn analyze_measures_a_sphere() {
     assert!((k - 1.0).abs() < 1e-9, "{k}");
 }
 
+/// The command lines a help text gives as examples: after `Example:` or indented below it, a `\`
+/// at the end continuing the line.
+#[cfg(unix)]
+fn examples(help: &str) -> Vec<String> {
+    let joined = help.replace("\\\n", " ");
+    let lines = joined.lines().map(|l| l.strip_prefix("Example: ").unwrap_or(l).trim_start());
+    lines.filter(|l| l.starts_with("umbilic ")).map(str::to_owned).collect()
+}
+
+/// A copy of a folder.
+#[cfg(unix)]
+fn copy(from: &Path, to: &Path) {
+    fs::create_dir(to).unwrap();
+    for entry in fs::read_dir(from).unwrap() {
+        let path = entry.unwrap().path();
+        let target = to.join(path.file_name().unwrap());
+        if path.is_dir() {
+            copy(&path, &target);
+        } else {
+            fs::copy(&path, target).unwrap();
+        }
+    }
+}
+
+#[cfg(unix)]
 #[test]
 fn every_help_has_an_example_that_works_as_printed() {
-    for command in ["analyze", "convert", "fit"] {
-        let help = String::from_utf8(run(&[command, "--help"]).stdout).unwrap();
-        let line = help.lines().find_map(|l| l.strip_prefix("Example: umbilic "));
-        let line = line.unwrap_or_else(|| panic!("{command} has no example: {help}"));
-        let folder = tempfile::tempdir().unwrap();
-        let link = folder.path().join("fixtures");
-        fs::create_dir(&link).unwrap();
-        for entry in fs::read_dir(root().join("fixtures")).unwrap() {
-            let path = entry.unwrap().path();
-            if path.is_file() {
-                fs::copy(&path, link.join(path.file_name().unwrap())).unwrap();
-            }
+    let folder = tempfile::tempdir().unwrap();
+    copy(&root().join("fixtures"), &folder.path().join("fixtures"));
+    let programs = Path::new(env!("CARGO_BIN_EXE_umbilic")).parent().unwrap();
+    let path = format!("{}:{}", programs.display(), std::env::var("PATH").unwrap());
+    for command in cli::command().get_subcommands() {
+        let name = command.get_name();
+        let help = String::from_utf8(run(&[name, "--help"]).stdout).unwrap();
+        let lines = examples(&help);
+        assert!(!lines.is_empty(), "{name} has no example: {help}");
+        // The demo has a test of its own.
+        for line in lines.iter().filter(|_| name != "demo") {
+            let mut shell = Command::new("sh");
+            shell.args(["-c", line]).current_dir(folder.path()).env("PATH", &path);
+            let output = shell.output().unwrap();
+            assert_eq!(code(&output), 0, "{line}: {}", errors(&output));
+            assert_eq!(errors(&output), "", "{line}");
         }
-        let output = Command::new(env!("CARGO_BIN_EXE_umbilic"))
-            .args(line.split_whitespace())
-            .current_dir(folder.path())
-            .output()
-            .unwrap();
-        assert_eq!(code(&output), 0, "{line}: {}", errors(&output));
-        assert_eq!(errors(&output), "", "{line}");
     }
 }
 

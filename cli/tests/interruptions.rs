@@ -89,6 +89,26 @@ fn ctrl_c_writes_the_checkpoint_and_a_resumed_run_ends_in_the_same_bytes() {
 }
 
 #[test]
+fn ctrl_c_ends_a_command_that_has_no_state_to_keep() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let out = folder.path().join("out.obj").display().to_string();
+    let mut child = Command::new(UMBILIC)
+        .current_dir(root())
+        .args(["panel", "fixtures/roof-optimised.ron", "--panels", "150x150", "--molds", "40"])
+        .args(["-o", &out])
+        .spawn()
+        .expect("the program starts");
+    // Long enough for the handler to be set up, too short for 22500 panels.
+    std::thread::sleep(Duration::from_millis(500));
+    let signal = Instant::now();
+    let pid = child.id().to_string();
+    assert!(Command::new("kill").args(["-INT", &pid]).status().expect("kill").success());
+    assert_eq!(child.wait().expect("it ends").code(), Some(130));
+    assert!(signal.elapsed() < Duration::from_secs(20));
+    assert!(names(folder.path()).is_empty());
+}
+
+#[test]
 fn a_kill_at_any_moment_leaves_the_old_file_or_the_new_one() {
     let folder = tempfile::tempdir().expect("a folder");
     let out = folder.path().join("out.glb");
