@@ -13,7 +13,7 @@ use rayon::prelude::*;
 use crate::bernstein;
 use crate::curve::BezierCurve;
 use crate::data::{AsymptoticNet, DATA_DEGREE};
-use crate::dense::{AffineSpace, Cholesky, Matrix, affine_space, dot};
+use geom_core::linalg::{AffineSpace, Cholesky, Matrix, affine_space, dot};
 use crate::error::{AsymptoticError, AsymptoticWarning};
 use crate::inflection::InflectedCurve;
 use crate::torsion_energy::TorsionCurve;
@@ -113,7 +113,7 @@ impl Boundary {
 
 /// One curve as an affine function of the torsions at its ends.
 struct CondensedCurve {
-    /// Control points for `(1, τ_start, τ_end)`.
+    /// Control points, measured from the start, for `(1, τ_start, τ_end)`.
     points: [Vec<DVec3>; 3],
     /// Energy as a quadratic form in `(1, τ_start, τ_end)`, symmetric.
     energy: [[f64; 3]; 3],
@@ -193,7 +193,9 @@ pub fn solve_boundary(
                 return inflected(&net, &frames, i, [s, e], options.degree);
             }
             let point = |k: usize| c.points[0][k] + c.points[1][k] * s + c.points[2][k] * e;
-            Ok((BezierCurve::new((0..=options.degree).map(point).collect()), Vec::new()))
+            let ends = curve.ends.map(|v| net.positions[v]);
+            let offsets = (0..=options.degree).map(point).collect();
+            Ok((BezierCurve::from_offsets(offsets, ends), Vec::new()))
         })
         .collect();
     let mut curves = Vec::with_capacity(solved.len());
@@ -226,14 +228,18 @@ fn inflected(
 ) -> Result<(BezierCurve, Vec<f64>), AsymptoticError> {
     let curve = &net.curves[i];
     let problem = InflectedCurve {
-        ends: curve.ends.map(|v| net.positions[v]),
+        chord: net.positions[curve.ends[1]] - net.positions[curve.ends[0]],
         arms: curve.arms,
         normals: curve.ends.map(|v| frames[v].as_ref().map_or(DVec3::Z, |f| f.normal)),
         curvatures: curve.curvatures,
         torsions,
     };
     match problem.solve(curve.inflections) {
-        Ok(found) => Ok((found.curve.elevated(degree), found.parameters)),
+        Ok(found) => {
+            let ends = curve.ends.map(|v| net.positions[v]);
+            let curve = BezierCurve::from_offsets(found.curve.offsets().to_vec(), ends);
+            Ok((curve.elevated(degree), found.parameters))
+        }
         Err((defect, iterations)) => Err(AsymptoticError::InflectionNotFound {
             place: net.curve_place(i),
             defect,
@@ -264,7 +270,8 @@ fn condense(
     let curve = &net.curves[i];
     let p = degree as f64;
     let scale = DATA_DEGREE as f64 / p;
-    let end_points = curve.ends.map(|v| net.positions[v]);
+    // Measured from the start: far from the origin the heights would lose their digits.
+    let end_points = [DVec3::ZERO, net.positions[curve.ends[1]] - net.positions[curve.ends[0]]];
     let arms = curve.arms.map(|a| a * scale);
     let normals = curve.ends.map(|v| frames[v].as_ref().map_or(DVec3::Z, |f| f.normal));
     // Constant part: end points, tangents, and the curvature's share of the third points.
@@ -291,11 +298,9 @@ fn condense(
             hessian[(a, b)] = gram[(*ka, *kb)] * da.dot(*db);
         }
     }
-    // Translation does not change the energy; measured from the start it does not cancel.
-    let shifted: Vec<DVec3> = base.iter().map(|p| *p - base[0]).collect();
     let gradient: Vec<f64> = columns
         .iter()
-        .map(|(k, d)| (0..=degree).map(|j| gram[(*k, j)] * d.dot(shifted[j])).sum())
+        .map(|(k, d)| (0..=degree).map(|j| gram[(*k, j)] * d.dot(base[j])).sum())
         .collect();
     let scaling: Vec<f64> = (0..n).map(|a| hessian[(a, a)].sqrt().recip()).collect();
 
@@ -365,7 +370,7 @@ fn condense(
     });
     let mut energy = [[0.0; 3]; 3];
     let constant: f64 = (0..=degree)
-        .map(|a| (0..=degree).map(|b| gram[(a, b)] * shifted[a].dot(shifted[b])).sum::<f64>())
+        .map(|a| (0..=degree).map(|b| gram[(a, b)] * base[a].dot(base[b])).sum::<f64>())
         .sum();
     for a in 0..3 {
         let hz = hessian.apply(&z[a]);

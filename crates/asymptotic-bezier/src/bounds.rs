@@ -2,7 +2,8 @@
 
 use geom_core::DVec3;
 
-use crate::dense::{Cholesky, Matrix, axpy, dot};
+use geom_core::linalg::axpy;
+use gp_solver::{DenseQp, Status};
 use crate::patch::{PatchBoundary, PatchFamily};
 
 /// Samples per curve at which the bounds are imposed.
@@ -37,7 +38,7 @@ pub(crate) fn strips(family: &PatchFamily, boundary: &PatchBoundary) -> Strips {
         if family.strip_normal(i, 0.0).is_none() {
             continue;
         }
-        let first = crate::bernstein::derivative(boundary.curves[i].points());
+        let first = crate::bernstein::derivative(boundary.curves[i].offsets());
         let across = |t: f64| {
             let normal = family.strip_normal(i, t).unwrap_or(DVec3::ZERO);
             normal.cross(crate::bernstein::eval(&first, t)).normalize_or_zero()
@@ -91,10 +92,11 @@ impl Strips {
     pub(crate) fn minimize(
         &self,
         family: &PatchFamily,
-        free: &[f64],
         theta: f64,
     ) -> Option<Vec<f64>> {
-        let (mut rows, mut right) = (Vec::new(), Vec::new());
+        let n = family.gradient.len();
+        let hessian: Vec<f64> = (0..n).flat_map(|i| family.hessian.row(i)).copied().collect();
+        let mut program = DenseQp::new(n, hessian, family.gradient.clone());
         for s in &self.samples {
             // The corners themselves are fixed.
             if s.t == 0.0 || s.t == 1.0 {
@@ -102,107 +104,10 @@ impl Strips {
             }
             let (constant, row) = family.field_row(s.curve, s.t, s.across);
             // In units of the corner value all rows are comparable.
-            rows.push(row.iter().map(|a| a / s.corner).collect::<Vec<f64>>());
-            right.push(theta - constant / s.corner);
+            let row: Vec<f64> = row.iter().map(|a| a / s.corner).collect();
+            program.at_least(&row, theta - constant / s.corner);
         }
-        bounded_minimum(&family.hessian, free, &rows, &right)
-    }
-}
-
-/// Minimises `½ (y − y₀)ᵀ H (y − y₀)` subject to `rows · y ≥ right`.
-///
-/// The dual, `½ λᵀ K λ − rᵀ λ` over `λ ≥ 0` with `K = A H⁻¹ Aᵀ`, is solved by the active-set
-/// method of Lawson and Hanson 1974, ch. 23, written for normal equations.
-pub(crate) fn bounded_minimum(
-    hessian: &Matrix,
-    free: &[f64],
-    rows: &[Vec<f64>],
-    right: &[f64],
-) -> Option<Vec<f64>> {
-    let factor = Cholesky::new(hessian, 1e-15)?;
-    let m = rows.len();
-    // Half-transformed rows L⁻¹ a, so that K is their Gram matrix.
-    let half: Vec<Vec<f64>> = rows.iter().map(|a| factor.forward_substitute(a)).collect();
-    let gap: Vec<f64> = rows.iter().zip(right).map(|(a, b)| b - dot(a, free)).collect();
-    let mut lambda = vec![0.0; m];
-    let mut passive: Vec<usize> = Vec::new();
-    let mut shift = vec![0.0; free.len()];
-    for _ in 0..20 * m {
-        // Slack of the dual gradient: how much each bound is still violated.
-        let worst = (0..m)
-            .filter(|i| !passive.contains(i))
-            .map(|i| (i, gap[i] - dot(&half[i], &shift)))
-            .fold((usize::MAX, 1e-11), |best, item| if item.1 > best.1 { item } else { best });
-        if worst.0 == usize::MAX {
-            let step = factor.back_substitute(&shift);
-            return Some(free.iter().zip(step).map(|(y, s)| y + s).collect());
-        }
-        passive.push(worst.0);
-        loop {
-            let trial = solve_passive(&half, &gap, &passive)?;
-            if trial.iter().all(|l| *l > 0.0) {
-                for (k, i) in passive.iter().enumerate() {
-                    lambda[*i] = trial[k];
-                }
-                break;
-            }
-            let mut step = 1.0_f64;
-            for (k, i) in passive.iter().enumerate() {
-                if trial[k] <= 0.0 {
-                    step = step.min(lambda[*i] / (lambda[*i] - trial[k]));
-                }
-            }
-            for (k, i) in passive.iter().enumerate() {
-                lambda[*i] += step * (trial[k] - lambda[*i]);
-            }
-            let before = passive.len();
-            passive.retain(|i| lambda[*i] > 1e-14);
-            if passive.len() == before {
-                return None;
-            }
-            if passive.is_empty() {
-                break;
-            }
-        }
-        if lambda.iter().any(|l| !l.is_finite() || *l > 1e12) {
-            return None;
-        }
-        shift.fill(0.0);
-        for i in &passive {
-            axpy(lambda[*i], &half[*i], &mut shift);
-        }
-    }
-    None
-}
-
-/// `K_PP λ = gap_P` by Cholesky, with a whisper of ridge for neighbouring samples.
-fn solve_passive(half: &[Vec<f64>], gap: &[f64], passive: &[usize]) -> Option<Vec<f64>> {
-    let n = passive.len();
-    let mut k = Matrix::zeros(n, n);
-    for (a, i) in passive.iter().enumerate() {
-        for (b, j) in passive.iter().enumerate() {
-            k[(a, b)] = dot(&half[*i], &half[*j]);
-        }
-        k[(a, a)] *= 1.0 + 1e-13;
-    }
-    let right: Vec<f64> = passive.iter().map(|i| gap[*i]).collect();
-    Some(Cholesky::new(&k, 0.0)?.solve(&right))
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn bounded_minimum_projects_onto_the_polygon() {
-        let h = Matrix::identity(2);
-        // x ≥ 1 and x + y ≥ 3 from the origin: the nearest point is (1.5, 1.5).
-        let y = bounded_minimum(&h, &[0.0, 0.0], &[vec![1.0, 0.0], vec![1.0, 1.0]], &[1.0, 3.0]);
-        let y = y.unwrap();
-        assert!((y[0] - 1.5).abs() < 1e-12 && (y[1] - 1.5).abs() < 1e-12);
-        // x ≥ 1 and −x ≥ 0 contradict.
-        let none =
-            bounded_minimum(&h, &[0.0, 0.0], &[vec![1.0, 0.0], vec![-1.0, 0.0]], &[1.0, 0.0]);
-        assert!(none.is_none());
+        let solution = program.solve().ok()?;
+        (solution.status == Status::Converged).then_some(solution.x)
     }
 }

@@ -8,9 +8,14 @@ use crate::bernstein;
 pub(crate) const CURVE_SAMPLES: usize = 401;
 
 /// A Bezier curve in space, at least a cubic and finite (the solvers that build it see to both).
+///
+/// Besides the control points it keeps their offsets from the first one. The torsion of a curve of
+/// length `h` divides third differences by `h³`, so the rounding of coordinates far from the origin
+/// would show; the offsets are rounded in units of the curve itself.
 #[derive(Clone, Debug, PartialEq)]
 pub struct BezierCurve {
     points: Vec<DVec3>,
+    offsets: Vec<DVec3>,
 }
 
 /// Position and the first three derivatives with respect to the parameter.
@@ -66,7 +71,18 @@ impl BezierCurve {
     #[must_use]
     pub fn new(points: Vec<DVec3>) -> Self {
         assert!(points.len() >= 4, "a boundary curve is at least a cubic");
-        Self { points }
+        let offsets = points.iter().map(|p| *p - points[0]).collect();
+        Self { points, offsets }
+    }
+
+    /// The curve between two points with these offsets from the first.
+    pub(crate) fn from_offsets(offsets: Vec<DVec3>, [start, end]: [DVec3; 2]) -> Self {
+        let mut points: Vec<DVec3> = offsets.iter().map(|d| start + *d).collect();
+        // Curves that meet share the vertex to the last bit.
+        if let Some(last) = points.last_mut() {
+            *last = end;
+        }
+        Self { points, offsets }
     }
 
     /// Polynomial degree.
@@ -81,22 +97,33 @@ impl BezierCurve {
         &self.points
     }
 
+    /// Control points measured from the first one.
+    pub(crate) fn offsets(&self) -> &[DVec3] {
+        &self.offsets
+    }
+
+    fn ends(&self) -> [DVec3; 2] {
+        [self.points[0], self.points[self.degree()]]
+    }
+
     /// The curve traversed the other way.
     #[must_use]
     pub fn reversed(&self) -> Self {
-        Self { points: self.points.iter().rev().copied().collect() }
+        let last = self.offsets[self.degree()];
+        let offsets = self.offsets.iter().rev().map(|d| *d - last).collect();
+        Self { points: self.points.iter().rev().copied().collect(), offsets }
     }
 
     /// The same curve written in degree `degree`, which is not below its own.
     #[must_use]
     pub fn elevated(&self, degree: usize) -> Self {
-        Self { points: bernstein::elevate(&self.points, degree) }
+        Self::from_offsets(bernstein::elevate(&self.offsets, degree), self.ends())
     }
 
     /// Position at `t`.
     #[must_use]
     pub fn position(&self, t: f64) -> DVec3 {
-        bernstein::eval(&self.points, t)
+        self.points[0] + bernstein::eval(&self.offsets, t)
     }
 
     /// `segments + 1` points, evenly spaced in the parameter.
@@ -115,7 +142,7 @@ impl BezierCurve {
     #[must_use]
     pub fn derivative_energy(&self, order: usize) -> f64 {
         // Differences first: a straight curve then has no energy rather than rounding noise.
-        let mut polygon = self.points.clone();
+        let mut polygon = self.offsets.clone();
         for _ in 0..order {
             polygon = bernstein::derivative(&polygon);
         }
@@ -175,7 +202,8 @@ impl BezierCurve {
 
 /// Derivative polygons of a curve, kept for many evaluations.
 pub(crate) struct JetTable<'a> {
-    points: &'a [DVec3],
+    start: DVec3,
+    offsets: &'a [DVec3],
     first: Vec<DVec3>,
     second: Vec<DVec3>,
     third: Vec<DVec3>,
@@ -183,15 +211,15 @@ pub(crate) struct JetTable<'a> {
 
 impl<'a> JetTable<'a> {
     pub(crate) fn new(curve: &'a BezierCurve) -> Self {
-        let first = bernstein::derivative(&curve.points);
+        let first = bernstein::derivative(&curve.offsets);
         let second = bernstein::derivative(&first);
         let third = bernstein::derivative(&second);
-        Self { points: &curve.points, first, second, third }
+        Self { start: curve.points[0], offsets: &curve.offsets, first, second, third }
     }
 
     pub(crate) fn at(&self, t: f64) -> CurveJet {
         CurveJet {
-            position: bernstein::eval(self.points, t),
+            position: self.start + bernstein::eval(self.offsets, t),
             first: bernstein::eval(&self.first, t),
             second: bernstein::eval(&self.second, t),
             third: bernstein::eval(&self.third, t),

@@ -26,7 +26,7 @@ pub(crate) struct FieldSpace {
 
 /// All polynomial tangent fields of degree `n` along `curve`, whose inflections are given.
 pub(crate) fn tangent_module(curve: &BezierCurve, inflections: &[f64], n: usize) -> FieldSpace {
-    let differences: Vec<DVec3> = curve.points().windows(2).map(|w| w[1] - w[0]).collect();
+    let differences: Vec<DVec3> = curve.offsets().windows(2).map(|w| w[1] - w[0]).collect();
     let last = differences.len() - 1;
     let mut basis = [differences[..last].to_vec(), differences[1..].to_vec()];
     for &t0 in inflections {
@@ -86,7 +86,7 @@ pub(crate) fn line_fields(n: usize) -> FieldSpace {
 
 /// The fields in the planes of a line and a direction field across it: `f e + g W`.
 pub(crate) fn ribbon_fields(curve: &BezierCurve, ribbon: &[DVec3; 4], n: usize) -> FieldSpace {
-    let points = curve.points();
+    let points = curve.offsets();
     let along = points[points.len() - 1] - points[0];
     let mut fields: Vec<Vec<DVec3>> = (0..=n).map(|j| times_basis(n, j, &[along])).collect();
     fields.extend((0..=n - 3).map(|j| times_basis(n - 3, j, ribbon)));
@@ -99,7 +99,7 @@ pub(crate) fn ribbon_fields(curve: &BezierCurve, ribbon: &[DVec3; 4], n: usize) 
 /// paper sets them "without loss of generality" after its Eq. 4.2.
 pub(crate) fn paper_ansatz(curve: &BezierCurve, free_alphas: bool) -> FieldSpace {
     let p = curve.degree();
-    let first = derivative(curve.points());
+    let first = derivative(curve.offsets());
     let second = derivative(&first);
     // r′ × r″ written in degree 2p − 3 has true degree 2p − 4: take one degree off.
     let lifted = cross(&first, &second);

@@ -7,7 +7,7 @@
 use std::sync::OnceLock;
 
 use crate::bernstein::gram;
-use crate::dense::{Cholesky, Matrix};
+use geom_core::linalg::{Cholesky, Matrix};
 
 /// Highest surface degree.
 pub const MAX_SURFACE_DEGREE: usize = 15;
@@ -109,9 +109,9 @@ mod tests {
             {
                 assert!((got - want).abs() < bound, "bi-{n}: {}", (got - want).abs());
             }
-            let energy = crate::dense::dot(&table.border_border.apply(&border), &border)
-                + 2.0 * crate::dense::dot(&table.second_border.apply(&border), &second)
-                + crate::dense::dot(&table.second_second.apply(&second), &second);
+            let energy = geom_core::linalg::dot(&table.border_border.apply(&border), &border)
+                + 2.0 * geom_core::linalg::dot(&table.second_border.apply(&border), &second)
+                + geom_core::linalg::dot(&table.second_second.apply(&second), &second);
             assert!((energy - 2.0).abs() < 1e-9, "bi-{n}: {energy}");
         }
     }

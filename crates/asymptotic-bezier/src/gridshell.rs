@@ -142,7 +142,7 @@ fn line_ribbons(net: &AsymptoticNet, boundary: &Boundary) -> Vec<Option<[DVec3; 
             if !curve.line || faces[i] < 2 {
                 return None;
             }
-            let points = boundary.curves[i].points();
+            let points = boundary.curves[i].offsets();
             let last = points.len() - 1;
             let along = (points[last] - points[0]).normalize();
             let [start, end] = [0, 1].map(|e| {

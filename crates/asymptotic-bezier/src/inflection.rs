@@ -10,7 +10,7 @@ use geom_core::DVec3;
 
 use crate::bernstein::{derivative, eval};
 use crate::curve::BezierCurve;
-use crate::dense::{Matrix, affine_space, norm};
+use geom_core::linalg::{Matrix, affine_space, norm};
 
 /// Relative residual at which the equations count as solved.
 const TOL: f64 = 1e-13;
@@ -22,7 +22,8 @@ const CURVATURE_WEIGHT: f64 = 4.0;
 /// Data of one curve between two vertices whose torsions are known.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct InflectedCurve {
-    pub(crate) ends: [DVec3; 2],
+    /// From start to end; the start is the origin.
+    pub(crate) chord: DVec3,
     pub(crate) arms: [DVec3; 2],
     pub(crate) normals: [DVec3; 2],
     /// Left-signed wishes.
@@ -141,18 +142,22 @@ impl InflectedCurve {
             return Err(1.0);
         }
         let curve = self.curve(&z);
-        let chord = (self.ends[1] - self.ends[0]).length_squared();
+        let chord = self.chord.length_squared();
         let strain = curve.derivative_energy(2) / chord;
         let moved: f64 = ratios.iter().map(|r| r.ln().powi(2)).sum();
         Ok((strain + CURVATURE_WEIGHT * moved, z, t))
     }
 
+    fn end(&self, e: usize) -> DVec3 {
+        self.chord * e as f64
+    }
+
     fn curve(&self, z: &[f64]) -> BezierCurve {
         let third = |e: usize, x: f64, k: f64| {
             let arm = self.arms[e];
-            self.ends[e] + arm * x + self.normals[e].cross(arm) * (1.25 * k * arm.length())
+            self.end(e) + arm * x + self.normals[e].cross(arm) * (1.25 * k * arm.length())
         };
-        let [p, q] = self.ends;
+        let [p, q] = [self.end(0), self.end(1)];
         BezierCurve::new(vec![
             p,
             p + self.arms[0],
@@ -167,12 +172,12 @@ impl InflectedCurve {
     fn equations(&self, z: &[f64], t: &[f64]) -> Vec<f64> {
         let curve = self.curve(z);
         let points = curve.points();
-        let chord = (self.ends[1] - self.ends[0]).length();
+        let chord = self.chord.length();
         let mut out = Vec::with_capacity(2 + 3 * t.len());
         for (e, k) in [(0, z[1]), (1, z[3])] {
             let third = points[if e == 0 { 3 } else { 2 }];
             let lever = k * self.arms[e].length().powi(3) * 25.0 / 12.0;
-            let height = self.normals[e].dot(third - self.ends[e]);
+            let height = self.normals[e].dot(third - self.end(e));
             out.push((height - lever * self.torsions[e]) / chord);
         }
         let first = derivative(points);

@@ -31,7 +31,6 @@ mod boundary;
 mod bounds;
 mod curve;
 mod data;
-mod dense;
 mod design;
 mod error;
 mod field;

@@ -5,7 +5,7 @@
 //! amplifies errors and folds the patch (their Fig. 4.2b), so it is not offered.
 
 use crate::bernstein::gram;
-use crate::dense::{Matrix, affine_space, dot};
+use geom_core::linalg::{Matrix, affine_space, dot};
 use crate::surface::Patch;
 
 /// How the inner control points are found.

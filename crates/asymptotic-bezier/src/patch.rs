@@ -3,10 +3,10 @@
 
 use geom_core::DVec3;
 
-use crate::bernstein::{bernstein, eval};
+use crate::bernstein::{bernstein, elevate, eval};
 use crate::bounds;
 use crate::curve::BezierCurve;
-use crate::dense::{Matrix, affine_space, axpy, dot, minimize_quadratic};
+use geom_core::linalg::{Matrix, affine_space, axpy, dot, minimize_quadratic};
 use crate::error::{AsymptoticError, AsymptoticWarning, Place};
 use crate::field::{FieldSpace, line_fields, paper_ansatz, ribbon_fields, tangent_module};
 use crate::fill::{MAX_SURFACE_DEGREE, fill_table};
@@ -159,6 +159,8 @@ pub fn fill_patch(
 /// The affine family of control points in the freedoms of the tangent fields.
 pub(crate) struct PatchFamily {
     pub(crate) degree: usize,
+    /// Corner `00`, from which everything else is measured.
+    pub(crate) origin: DVec3,
     /// Elevated boundary rows.
     pub(crate) rows: [Vec<DVec3>; 4],
     pub(crate) spaces: [FieldSpace; 4],
@@ -190,7 +192,7 @@ fn fill_degree(
     if let (Some(theta), Ansatz::Module) = (options.bound, options.ansatz)
         && transversality.value < theta - 1e-12
     {
-        if let Some(bounded) = strips.minimize(&family, &y, theta) {
+        if let Some(bounded) = strips.minimize(&family, theta) {
             y = bounded;
             transversality = strips.worst(&family, &y);
             warnings.push(AsymptoticWarning::BoundsActive { place });
@@ -235,14 +237,19 @@ impl PatchFamily {
                 Ansatz::PaperFree => paper_ansatz(curve, true),
             }
         });
-        let rows: [Vec<DVec3>; 4] =
-            std::array::from_fn(|i| boundary.curves[i].elevated(n).points().to_vec());
+        let origin = boundary.curves[0].points()[0];
+        let rows: [Vec<DVec3>; 4] = std::array::from_fn(|i| {
+            let curve = &boundary.curves[i];
+            let start = curve.points()[0] - origin;
+            elevate(curve.offsets(), n).iter().map(|d| start + *d).collect()
+        });
         let mut offsets = [0; 5];
         for i in 0..4 {
             offsets[i + 1] = offsets[i] + spaces[i].fields.len();
         }
         let mut family = Self {
             degree: n,
+            origin,
             rows,
             spaces,
             offsets,
@@ -381,12 +388,11 @@ impl PatchFamily {
             second.push(point);
         }
         let border: Vec<DVec3> = table.border.iter().map(|ij| self.border_point(*ij)).collect();
-        let origin = border[0];
         let mut hessian = Matrix::zeros(ny, ny);
         let mut gradient = vec![0.0; ny];
         for axis in 0..3 {
-            let b: Vec<f64> = border.iter().map(|p| (*p - origin)[axis]).collect();
-            let s: Vec<f64> = second.iter().map(|p| (*p - origin)[axis]).collect();
+            let b: Vec<f64> = border.iter().map(|p| p[axis]).collect();
+            let s: Vec<f64> = second.iter().map(|p| p[axis]).collect();
             let mut force = table.second_border.apply(&b);
             axpy(1.0, &table.second_second.apply(&s), &mut force);
             axpy(1.0, &slopes[axis].apply_transpose(&force), &mut gradient);
@@ -414,7 +420,6 @@ impl PatchFamily {
         let n = self.degree;
         let table = fill_table(n);
         let border: Vec<DVec3> = table.border.iter().map(|ij| self.border_point(*ij)).collect();
-        let origin = border[0];
         let mut points = vec![DVec3::ZERO; (n + 1) * (n + 1)];
         let mut energy = 0.0;
         let mut second = self.second.clone();
@@ -423,20 +428,23 @@ impl PatchFamily {
             for (point, step) in second.iter_mut().zip(steps) {
                 point[axis] += step;
             }
-            let b: Vec<f64> = border.iter().map(|p| (*p - origin)[axis]).collect();
-            let s: Vec<f64> = second.iter().map(|p| (*p - origin)[axis]).collect();
+            let b: Vec<f64> = border.iter().map(|p| p[axis]).collect();
+            let s: Vec<f64> = second.iter().map(|p| p[axis]).collect();
             energy += dot(&table.border_border.apply(&b), &b)
                 + 2.0 * dot(&table.second_border.apply(&b), &s)
                 + dot(&table.second_second.apply(&s), &s);
             let ring: Vec<f64> = b.iter().chain(&s).copied().collect();
             for (value, (i, j)) in table.recover.apply(&ring).iter().zip(&table.inner) {
-                points[i * (n + 1) + j][axis] = value + origin[axis];
+                points[i * (n + 1) + j][axis] = *value;
             }
         }
         for (point, (i, j)) in
             border.iter().zip(&table.border).chain(second.iter().zip(&table.second))
         {
             points[i * (n + 1) + j] = *point;
+        }
+        for point in &mut points {
+            *point += self.origin;
         }
         (Patch::new(n, points), energy)
     }

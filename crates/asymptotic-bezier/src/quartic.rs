@@ -13,7 +13,7 @@ use geom_core::DVec3;
 use crate::bernstein;
 use crate::curve::BezierCurve;
 use crate::data::{CURVE_CORNERS, CornerData, DATA_DEGREE, INTO_IS_LEFT};
-use crate::dense::{Matrix, affine_space, minimize_quadratic, norm};
+use geom_core::linalg::{Matrix, affine_space, minimize_quadratic, norm};
 use crate::error::{AsymptoticError, Place};
 use crate::quad::{Quadrilateral, finish};
 

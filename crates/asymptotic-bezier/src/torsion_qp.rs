@@ -1,6 +1,7 @@
 //! The sparse quadratic programme of the vertex torsions, with simple bounds.
 
-use crate::dense::{Matrix, minimize_quadratic};
+use geom_core::linalg::{Matrix, axpy, minimize_quadratic};
+use gp_solver::{SolverError, SparseCholesky, SymmetricPattern};
 
 /// Up to this many free unknowns the system is solved densely.
 const DENSE_LIMIT: usize = 64;
@@ -92,7 +93,11 @@ fn solve_free(
         .map(|(i, j, a)| (index[*i], index[*j], *a))
         .collect();
     let own: Vec<f64> = free.iter().map(|v| diagonal[*v]).collect();
-    let solution = if free.len() <= DENSE_LIMIT {
+    let sparse = (free.len() > DENSE_LIMIT).then(|| sparse_minimum(&own, &inner, &right));
+    let solution = if let Some(Ok(solution)) = sparse {
+        solution
+    } else {
+        // Few unknowns, or a matrix singular to rounding, which the shifts in here can take.
         let mut a = Matrix::zeros(free.len(), free.len());
         for (k, d) in own.iter().enumerate() {
             a[(k, k)] = *d;
@@ -102,52 +107,38 @@ fn solve_free(
             a[(*j, *i)] += value;
         }
         minimize_quadratic(&a, &right)
-    } else {
-        conjugate_gradients(&own, &inner, &right)
     };
     for (k, v) in free.iter().enumerate() {
         tau[*v] = solution[k];
     }
 }
 
-/// Conjugate gradients with diagonal preconditioning, to rounding.
-fn conjugate_gradients(
+/// The same minimum by a sparse Cholesky factor.
+fn sparse_minimum(
     diagonal: &[f64],
     couplings: &[(usize, usize, f64)],
     gradient: &[f64],
-) -> Vec<f64> {
+) -> Result<Vec<f64>, SolverError> {
     let n = diagonal.len();
-    let apply = |x: &[f64]| {
-        let mut y: Vec<f64> = x.iter().zip(diagonal).map(|(x, d)| x * d).collect();
-        for &(i, j, a) in couplings {
-            y[i] += a * x[j];
-            y[j] += a * x[i];
-        }
-        y
-    };
-    let mut x = vec![0.0; n];
-    let mut r: Vec<f64> = gradient.iter().map(|g| -g).collect();
-    let precondition =
-        |r: &[f64]| -> Vec<f64> { r.iter().zip(diagonal).map(|(r, d)| r / d).collect() };
-    let mut z = precondition(&r);
-    let mut p = z.clone();
-    let mut rz = crate::dense::dot(&r, &z);
-    let target = rz * 1e-30;
-    for _ in 0..10 * n {
-        if !(rz > target) {
-            break;
-        }
-        let ap = apply(&p);
-        let step = rz / crate::dense::dot(&p, &ap);
-        crate::dense::axpy(step, &p, &mut x);
-        crate::dense::axpy(-step, &ap, &mut r);
-        z = precondition(&r);
-        let next = crate::dense::dot(&r, &z);
-        let beta = next / rz;
-        rz = next;
-        p.iter_mut().zip(&z).for_each(|(p, z)| *p = z + beta * *p);
+    let entries = couplings.iter().map(|(i, j, _)| (*i, *j));
+    let pattern = SymmetricPattern::new(n, entries.chain((0..n).map(|i| (i, i))))?;
+    let mut values = vec![0.0; pattern.len()];
+    let own = diagonal.iter().enumerate().map(|(i, d)| (i, i, *d));
+    for (i, j, a) in own.chain(couplings.iter().copied()) {
+        let slot = pattern.slot(i, j).expect("the pattern has every entry");
+        values[slot] += a;
     }
-    x
+    let mut factor = SparseCholesky::new(pattern)?;
+    factor.factor(&values)?;
+    let mut x: Vec<f64> = gradient.iter().map(|g| -g).collect();
+    factor.solve_in_place(&mut x);
+    // One step of refinement, as the dense solution has.
+    let mut image = vec![0.0; n];
+    factor.pattern().multiply(&values, &x, &mut image);
+    let mut step: Vec<f64> = gradient.iter().zip(&image).map(|(g, y)| -g - y).collect();
+    factor.solve_in_place(&mut step);
+    axpy(1.0, &step, &mut x);
+    Ok(x)
 }
 
 #[cfg(test)]
@@ -168,7 +159,7 @@ mod tests {
         let (d, c, g) = chain(60);
         let free = vec![[f64::NEG_INFINITY, f64::INFINITY]; 60];
         let dense = minimize(&d, &c, &g, &free);
-        for (a, b) in dense.iter().zip(conjugate_gradients(&d, &c, &g)) {
+        for (a, b) in dense.iter().zip(sparse_minimum(&d, &c, &g).unwrap()) {
             assert!((a - b).abs() < 1e-13);
         }
     }

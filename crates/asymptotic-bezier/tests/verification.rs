@@ -91,8 +91,7 @@ fn nets_of_minimal_surfaces_join_without_kinks() {
         let defect = check.patches.iter().map(|p| p.torsion_defect).fold(0.0, f64::max);
         println!("{name}: normal curvature {normal:e}, torsion defect {defect:e}");
         assert!(normal <= 1e-10, "{name}: {normal:e}");
-        // Of patches thirty to a side the second derivatives have fewer digits.
-        assert!(defect <= if name.contains("30x30") { 1e-7 } else { 1e-8 }, "{name}: {defect:e}");
+        assert!(defect <= 1e-8, "{name}: {defect:e}");
     }
 }
 

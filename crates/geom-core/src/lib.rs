@@ -11,6 +11,7 @@ mod forms;
 mod isolines;
 mod jet;
 mod least_squares;
+pub mod linalg;
 mod mesh_curvature;
 mod poly_mesh;
 mod quad_grid;
