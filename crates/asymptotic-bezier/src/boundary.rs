@@ -13,11 +13,11 @@ use rayon::prelude::*;
 use crate::bernstein;
 use crate::curve::BezierCurve;
 use crate::data::{AsymptoticNet, DATA_DEGREE};
-use geom_core::linalg::{AffineSpace, Cholesky, Matrix, affine_space, dot};
 use crate::error::{AsymptoticError, AsymptoticWarning};
 use crate::inflection::InflectedCurve;
 use crate::torsion_energy::TorsionCurve;
-use crate::vertex::{VertexFrame, vertex_frames};
+use crate::vertex::{PLANE_TOL, VertexFrame, vertex_frames};
+use geom_core::linalg::{AffineSpace, Cholesky, Matrix, affine_space, dot};
 
 /// A coefficient of a torsion equation this small, relative to the curve's size, is no coefficient.
 const VACUOUS_TOL: f64 = 1e-10;
@@ -143,7 +143,7 @@ pub fn solve_boundary(
     }
     net.check()?;
     let mut net = net.clone();
-    let frames = vertex_frames(&mut net)?;
+    let frames = vertex_frames(&mut net, PLANE_TOL)?;
     let order = if options.energy == BoundaryEnergy::Jerk { 3 } else { 2 };
     let gram = bernstein::gram(options.degree, order);
     let condensed: Vec<CondensedCurve> = (0..net.curves.len())
@@ -161,11 +161,11 @@ pub fn solve_boundary(
     pin_torsions(&net, &frames, &condensed, &mut bounds, &mut warnings)?;
     let mut torsions = solve_torsions(&net, &signs, &condensed, &bounds);
     // Where no curve carries the torsion, the twist of the corners estimates it.
+    let bilinear = bilinear_torsions(&net, &signs, &frames);
     for (v, frame) in frames.iter().enumerate() {
         let Some(frame) = frame else { continue };
         if frame.arms.iter().all(|(i, _)| silent(*i)) && bounds[v][0] < bounds[v][1] {
-            torsions[v] =
-                bilinear_torsion(&net, &signs, frame, v).clamp(bounds[v][0], bounds[v][1]);
+            torsions[v] = bilinear[v].clamp(bounds[v][0], bounds[v][1]);
         }
     }
     if options.energy == BoundaryEnergy::Torsion {
@@ -228,7 +228,7 @@ fn inflected(
 ) -> Result<(BezierCurve, Vec<f64>), AsymptoticError> {
     let curve = &net.curves[i];
     let problem = InflectedCurve {
-        chord: net.positions[curve.ends[1]] - net.positions[curve.ends[0]],
+        chord: net.chord(curve),
         arms: curve.arms,
         normals: curve.ends.map(|v| frames[v].as_ref().map_or(DVec3::Z, |f| f.normal)),
         curvatures: curve.curvatures,
@@ -249,7 +249,7 @@ fn inflected(
 }
 
 /// Torsion sign of each end of each curve.
-fn arm_signs(net: &AsymptoticNet, frames: &[Option<VertexFrame>]) -> Vec<[f64; 2]> {
+pub(crate) fn arm_signs(net: &AsymptoticNet, frames: &[Option<VertexFrame>]) -> Vec<[f64; 2]> {
     let mut signs = vec![[0.0; 2]; net.curves.len()];
     for frame in frames.iter().flatten() {
         for ((curve, end), sign) in frame.arms.iter().zip(&frame.signs) {
@@ -271,7 +271,7 @@ fn condense(
     let p = degree as f64;
     let scale = DATA_DEGREE as f64 / p;
     // Measured from the start: far from the origin the heights would lose their digits.
-    let end_points = [DVec3::ZERO, net.positions[curve.ends[1]] - net.positions[curve.ends[0]]];
+    let end_points = [DVec3::ZERO, net.chord(curve)];
     let arms = curve.arms.map(|a| a * scale);
     let normals = curve.ends.map(|v| frames[v].as_ref().map_or(DVec3::Z, |f| f.normal));
     // Constant part: end points, tangents, and the curvature's share of the third points.
@@ -415,9 +415,7 @@ fn pin_torsions(
             let other = forced.or((bounds[v][0] == bounds[v][1]).then_some(bounds[v][0]));
             if let Some(other) = other {
                 let defect = ((tau - other) * lever).abs();
-                let size = (net.positions[net.curves[*curve].ends[1]]
-                    - net.positions[net.curves[*curve].ends[0]])
-                    .length();
+                let size = net.chord(&net.curves[*curve]).length();
                 if !(defect <= 1e-10 * size) {
                     return Err(AsymptoticError::TorsionInfeasible { place, defect });
                 }
@@ -439,21 +437,28 @@ fn pin_torsions(
     Ok(())
 }
 
-/// Torsion `N·R_uv / |R_u × R_v|` of the bilinear patches in the faces at `v`, averaged.
-fn bilinear_torsion(net: &AsymptoticNet, signs: &[[f64; 2]], frame: &VertexFrame, v: usize) -> f64 {
-    let (mut sum, mut count) = (0.0, 0.0);
+/// Torsion `N·R_uv / |R_u × R_v|` of the bilinear patches in the faces at each vertex, averaged.
+pub(crate) fn bilinear_torsions(
+    net: &AsymptoticNet,
+    signs: &[[f64; 2]],
+    frames: &[Option<VertexFrame>],
+) -> Vec<f64> {
+    let mut sums = vec![[0.0, 0.0]; frames.len()];
     for face in &net.faces {
-        let Some(c) = (0..4).find(|c| net.face_corner(face, *c) == v) else { continue };
-        let x: [DVec3; 4] = std::array::from_fn(|c| net.positions[net.face_corner(face, c)]);
+        let corners: [usize; 4] = std::array::from_fn(|c| net.face_corner(face, c));
+        let x = corners.map(|v| net.positions[v]);
         let twist = x[3] - x[1] - x[2] + x[0];
         let (along_u, along_v) = ([x[1] - x[0], x[3] - x[2]], [x[2] - x[0], x[3] - x[1]]);
-        let area = along_u[c / 2].cross(along_v[c % 2]).length();
-        let u_curve = 2 * (c / 2);
-        let end = usize::from((c % 2 == 1) != face.reversed[u_curve]);
-        sum += signs[face.curves[u_curve]][end] * frame.normal.dot(twist) / area;
-        count += 1.0;
+        for (c, v) in corners.into_iter().enumerate() {
+            let normal = along_u[c / 2].cross(along_v[c % 2]);
+            let u_curve = 2 * (c / 2);
+            let end = usize::from((c % 2 == 1) != face.reversed[u_curve]);
+            let sign = signs[face.curves[u_curve]][end];
+            sums[v][0] += sign * normal.dot(twist) / normal.length_squared();
+            sums[v][1] += 1.0;
+        }
     }
-    if count > 0.0 { sum / count } else { 0.0 }
+    sums.iter().map(|[sum, count]| if *count > 0.0 { sum / count } else { 0.0 }).collect()
 }
 
 /// Minimises the sum of the condensed energies over the torsions within their bounds.

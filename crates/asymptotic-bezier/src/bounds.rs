@@ -2,9 +2,9 @@
 
 use geom_core::DVec3;
 
+use crate::patch::{PatchBoundary, PatchFamily};
 use geom_core::linalg::axpy;
 use gp_solver::{DenseQp, Status};
-use crate::patch::{PatchBoundary, PatchFamily};
 
 /// Samples per curve at which the bounds are imposed.
 const SAMPLES: usize = 41;
@@ -89,11 +89,7 @@ impl Strips {
 
     /// The minimum of the energy with every transversality at least `theta` of its corner value;
     /// `None` when that is infeasible.
-    pub(crate) fn minimize(
-        &self,
-        family: &PatchFamily,
-        theta: f64,
-    ) -> Option<Vec<f64>> {
+    pub(crate) fn minimize(&self, family: &PatchFamily, theta: f64) -> Option<Vec<f64>> {
         let n = family.gradient.len();
         let hessian: Vec<f64> = (0..n).flat_map(|i| family.hessian.row(i)).copied().collect();
         let mut program = DenseQp::new(n, hessian, family.gradient.clone());

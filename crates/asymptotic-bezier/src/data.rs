@@ -208,6 +208,11 @@ impl AsymptoticNet {
         &self.faces
     }
 
+    /// From the start to the end of `curve`.
+    pub(crate) fn chord(&self, curve: &NetCurve) -> DVec3 {
+        self.positions[curve.ends[1]] - self.positions[curve.ends[0]]
+    }
+
     /// Vertex of `face` at the corner `00`, `10`, `01`, `11` (0..3).
     #[must_use]
     pub fn face_corner(&self, face: &NetFace, corner: usize) -> usize {
@@ -246,7 +251,7 @@ impl AsymptoticNet {
     }
 
     fn check_curve(&self, place: Place, curve: &NetCurve) -> Result<(), AsymptoticError> {
-        let chord = self.positions[curve.ends[1]] - self.positions[curve.ends[0]];
+        let chord = self.chord(curve);
         let name = ["start", "end"];
         for e in 0..2 {
             if !curve.arms[e].is_finite() {

@@ -7,7 +7,7 @@ use crate::gridshell::{Gridshell, GridshellCheck, GridshellOptions, fill_net};
 use crate::patch::{PatchOptions, fill_patch};
 use crate::quad::{Quadrilateral, doubt_signs, solve_quadrilateral};
 use crate::quartic::solve_quartic_quadrilateral;
-use crate::relax::{RelaxOptions, Relaxed, relax};
+use crate::relax::{RelaxOptions, Relaxed, relax, relax_patch};
 
 /// What is to be bounded by asymptotic curves.
 #[derive(Clone, Debug, PartialEq)]
@@ -25,7 +25,7 @@ pub struct DesignOptions {
     pub boundary: BoundaryOptions,
     /// How the faces are filled.
     pub patch: PatchOptions,
-    /// Moves the data of a single patch where they are bad.
+    /// Moves tangents and curvatures where they are bad.
     pub relax: Option<RelaxOptions>,
 }
 
@@ -45,24 +45,22 @@ pub struct Design {
 /// Solves, fills and measures.
 ///
 /// # Errors
-/// The hard faults of [`AsymptoticError`]; [`AsymptoticError::Net`] when the relaxed mode, which
-/// is there for single patches, is asked for on a net.
+/// The hard faults of [`AsymptoticError`].
 pub fn design(input: &Input, options: &DesignOptions) -> Result<Design, AsymptoticError> {
     match input {
         Input::Patch(data) => design_patch(data, options),
         Input::Net(net) => {
-            if options.relax.is_some() {
-                let message =
-                    "the relaxed mode works on the corner data of one patch; drop it for nets";
-                return Err(AsymptoticError::Net { message: message.into() });
+            let mut boundary = options.boundary.clone();
+            let relaxed = options.relax.as_ref().map(|o| relax(net, o)).transpose()?;
+            let mut net = net.clone();
+            if let Some(relaxed) = &relaxed {
+                net = relaxed.net.clone();
+                boundary.torsions = relaxed.torsions.clone();
             }
-            let shell_options = GridshellOptions {
-                boundary: options.boundary.clone(),
-                patch: options.patch.clone(),
-            };
-            let shell = fill_net(net, &shell_options)?;
-            let check = shell.verify(net, &options.patch);
-            Ok(Design { net: net.clone(), shell, check, relaxed: None })
+            let shell_options = GridshellOptions { boundary, patch: options.patch.clone() };
+            let shell = fill_net(&net, &shell_options)?;
+            let check = shell.verify(&net, &options.patch);
+            Ok(Design { net, shell, check, relaxed })
         }
     }
 }
@@ -70,8 +68,11 @@ pub fn design(input: &Input, options: &DesignOptions) -> Result<Design, Asymptot
 fn design_patch(data: &CornerData, options: &DesignOptions) -> Result<Design, AsymptoticError> {
     let (data, quad, relaxed) = match &options.relax {
         Some(relax_options) => {
-            let relaxed = relax(data, relax_options)?;
-            (relaxed.data.clone(), relaxed.quad.clone(), Some(relaxed))
+            let (moved, relaxed) = relax_patch(data, relax_options)?;
+            let mut boundary = options.boundary.clone();
+            boundary.torsions = relaxed.torsions.clone();
+            let quad = solve_quadrilateral(&moved, &boundary)?;
+            (moved, quad, Some(relaxed))
         }
         None if options.boundary.degree == 4 => {
             (data.clone(), solve_quartic_quadrilateral(data)?, None)

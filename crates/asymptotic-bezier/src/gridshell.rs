@@ -80,7 +80,7 @@ pub fn fill_net(
 }
 
 /// Fills a net whose curves are solved already.
-fn fill_solved(
+pub(crate) fn fill_solved(
     net: &AsymptoticNet,
     boundary: Boundary,
     options: &PatchOptions,

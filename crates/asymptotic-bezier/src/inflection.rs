@@ -105,17 +105,22 @@ impl InflectedCurve {
                 break;
             }
             let mut jacobian = Matrix::zeros(value.len(), unknowns);
-            for k in 0..unknowns {
-                // Linear in each of z alone, so any step is exact; the parameters need a small one.
-                let step = if k < 4 + m { scale[k] } else { 1e-7 };
-                let (mut y, mut s) = (z.clone(), t.clone());
-                if k < 4 + m {
-                    y[k] += step;
-                } else {
-                    s[k - 4 - m] += step;
+            for k in 0..4 + m {
+                // Linear in each of them alone, so any step is exact.
+                let mut y = z.clone();
+                y[k] += scale[k];
+                for (r, (a, b)) in self.equations(&y, &t).iter().zip(&value).enumerate() {
+                    jacobian[(r, k)] = (a - b) / scale[k];
                 }
-                for (r, (a, b)) in self.equations(&y, &s).iter().zip(&value).enumerate() {
-                    jacobian[(r, k)] = (a - b) / step;
+            }
+            if free {
+                let curve = self.curve(&z);
+                for (k, t) in t.iter().enumerate() {
+                    let jet = curve.jet(*t);
+                    let slope = (jet.third - jet.second * z[4 + k]) / self.chord.length();
+                    for axis in 0..3 {
+                        jacobian[(2 + 3 * k + axis, 4 + m + k)] = slope[axis];
+                    }
                 }
             }
             let negative: Vec<f64> = value.iter().map(|v| -v).collect();

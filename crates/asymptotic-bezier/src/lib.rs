@@ -67,6 +67,6 @@ pub use mask::Interior;
 pub use patch::{Ansatz, FilledPatch, PatchBoundary, PatchOptions, fill_patch};
 pub use quad::{Quadrilateral, doubt_signs, solve_quadrilateral};
 pub use quartic::solve_quartic_quadrilateral;
-pub use relax::{RelaxOptions, Relaxed, relax};
+pub use relax::{RelaxOptions, Relaxed, relax, relax_patch};
 pub use surface::{Patch, PatchJet};
 pub use verify::PatchCheck;

@@ -5,8 +5,8 @@
 //! amplifies errors and folds the patch (their Fig. 4.2b), so it is not offered.
 
 use crate::bernstein::gram;
-use geom_core::linalg::{Matrix, affine_space, dot};
 use crate::surface::Patch;
+use geom_core::linalg::{Matrix, affine_space, dot};
 
 /// How the inner control points are found.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]

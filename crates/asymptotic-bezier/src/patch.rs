@@ -6,12 +6,12 @@ use geom_core::DVec3;
 use crate::bernstein::{bernstein, elevate, eval};
 use crate::bounds;
 use crate::curve::BezierCurve;
-use geom_core::linalg::{Matrix, affine_space, axpy, dot, minimize_quadratic};
 use crate::error::{AsymptoticError, AsymptoticWarning, Place};
 use crate::field::{FieldSpace, line_fields, paper_ansatz, ribbon_fields, tangent_module};
 use crate::fill::{MAX_SURFACE_DEGREE, fill_table};
 use crate::mask::{Interior, masked};
 use crate::surface::Patch;
+use geom_core::linalg::{Matrix, affine_space, axpy, dot, minimize_quadratic};
 
 /// Rank tolerance of the corner equations after scaling of the columns.
 const RANK_TOL: f64 = 1e-10;

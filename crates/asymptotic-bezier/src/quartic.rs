@@ -13,9 +13,9 @@ use geom_core::DVec3;
 use crate::bernstein;
 use crate::curve::BezierCurve;
 use crate::data::{CURVE_CORNERS, CornerData, DATA_DEGREE, INTO_IS_LEFT};
-use geom_core::linalg::{Matrix, affine_space, minimize_quadratic, norm};
 use crate::error::{AsymptoticError, Place};
 use crate::quad::{Quadrilateral, finish};
+use geom_core::linalg::{Matrix, affine_space, minimize_quadratic, norm};
 
 /// Sine between the corner planes below which they have no common line.
 const PLANE_TOL: f64 = 1e-9;

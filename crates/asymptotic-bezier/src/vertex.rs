@@ -7,7 +7,7 @@ use crate::error::AsymptoticError;
 
 /// Arms may leave their common plane by this much (0.5 degrees) before they are refused; within
 /// it they are projected.
-const PLANE_TOL: f64 = 8.7e-3;
+pub(crate) const PLANE_TOL: f64 = 8.7e-3;
 
 /// The tangent plane at a vertex and the torsion signs of its arms.
 #[derive(Clone, Debug, PartialEq)]
@@ -26,9 +26,10 @@ pub(crate) struct VertexFrame {
 ///
 /// The torsion of the curves of one family is `+τ_v` and of the other `−τ_v` (Wang et al. 2019,
 /// Prop. 3.1); families are spread over the faces from the first one, and locally where that
-/// is contradictory.
+/// is contradictory. Arms that leave the plane by more than the angle `plane_tol` are refused.
 pub(crate) fn vertex_frames(
     net: &mut AsymptoticNet,
+    plane_tol: f64,
 ) -> Result<Vec<Option<VertexFrame>>, AsymptoticError> {
     let families = curve_families(net);
     let mut arms: Vec<Vec<(usize, usize)>> = vec![Vec::new(); net.positions.len()];
@@ -71,11 +72,11 @@ pub(crate) fn vertex_frames(
             let directions: Vec<DVec3> = arms.iter().map(|a| direction(*a)).collect();
             normal = fit_normal(&directions, normal);
             let worst = directions.iter().map(|d| d.dot(normal).abs()).fold(0.0, f64::max);
-            if !(worst <= PLANE_TOL) {
+            if !(worst <= plane_tol) {
                 return Err(AsymptoticError::TangentsNotCoplanar {
                     place,
                     angle_deg: worst.min(1.0).asin().to_degrees(),
-                    limit_deg: PLANE_TOL.to_degrees(),
+                    limit_deg: plane_tol.to_degrees(),
                 });
             }
             for &(i, e) in &arms {

@@ -4,12 +4,11 @@
 mod common;
 
 use asymptotic_bezier::{
-    AsymptoticNet, BoundaryEnergy, BoundaryOptions, CornerData, Curvatures, GridshellOptions,
-    Interior, NetCurve, PatchCheck, PatchOptions, Place, Quadrilateral, TorsionHandle, fill_net,
-    fill_patch, solve_quadrilateral, solve_quartic_quadrilateral,
+    BoundaryEnergy, BoundaryOptions, CornerData, Curvatures, GridshellOptions, Interior,
+    PatchCheck, PatchOptions, Place, Quadrilateral, TorsionHandle, fill_net, fill_patch,
+    solve_quadrilateral, solve_quartic_quadrilateral,
 };
-use common::{catenoid, corner_data, enneper, reference_set};
-use geom_core::DVec3;
+use common::{catenoid, corner_data, enneper, reference_set, star, wave};
 
 fn filled(quad: &Quadrilateral) -> (f64, PatchCheck) {
     let filled = fill_patch(&quad.boundary, &PatchOptions::default(), Place::Patch(0)).unwrap();
@@ -29,6 +28,41 @@ fn inflected_boundaries_give_regular_patches() {
     assert!(check.sine > 0.9 && check.normal_curvature < 1e-10 && check.torsion_defect < 1e-8);
     assert!(check.positive_gauss == 0.0 && check.self_intersections == 0);
     assert!(energy < 1.2, "{energy}");
+}
+
+/// Two inflections on r1: the torsions at its ends are those of an exact solution.
+#[test]
+fn two_inflections_on_one_curve_give_a_regular_patch() {
+    let (data, torsions, roots) = wave();
+    let options = BoundaryOptions {
+        torsions: vec![TorsionHandle::Fixed(torsions[0]), TorsionHandle::Fixed(torsions[1])],
+        ..Default::default()
+    };
+    let quad = solve_quadrilateral(&data, &options).unwrap();
+    println!("{:?} {:?} {:?}", quad.boundary.inflections, quad.torsions, quad.warnings);
+    for (got, want) in quad.boundary.inflections[0].iter().zip(roots) {
+        // Shifting both alike hardly changes the equations, so they are not known better.
+        assert!((got - want).abs() < 1e-4, "{got} {want}");
+        let jet = quad.boundary.curves[0].jet(*got);
+        assert!(jet.first.cross(jet.second).length() < 1e-10);
+    }
+    let (energy, check) = filled(&quad);
+    println!("{energy} {check:?}");
+    assert!(check.sine > 0.5 && check.normal_curvature < 1e-10 && check.torsion_defect < 1e-8);
+    assert!(check.self_intersections == 0);
+    // Left to the corners' twist the torsions differ a little, and the curvatures give way.
+    let quad = solve_quadrilateral(&data, &BoundaryOptions::default()).unwrap();
+    assert_eq!(quad.boundary.inflections[0].len(), 2);
+    let (_, check) = filled(&quad);
+    assert!(check.sine > 0.5 && check.normal_curvature < 1e-10 && check.torsion_defect < 1e-8);
+    // Without the saturated fields the normal of the plain ones dies at both inflections.
+    let mut plain = quad.boundary.clone();
+    plain.inflections[0].clear();
+    let options = PatchOptions { degree: Some(7), bound: None, ..Default::default() };
+    let folded = fill_patch(&plain, &options, Place::Patch(0)).unwrap();
+    let check = PatchCheck::new(&folded.patch, &plain);
+    println!("{check:?}");
+    assert!(check.normal_step < 0.0 && check.boundary_sine < 0.1);
 }
 
 /// E+ with sides straightened (energies of the independent solution).
@@ -151,71 +185,40 @@ fn other_energies_and_higher_degrees_lower_what_they_minimise() {
     }
 }
 
-/// `valence` quads around the origin with the tangent planes of the monkey saddle
-/// `z = 0.02 (x³ − 3 x y²)`; arms turn alike, so that no curve has an inflection.
-fn star(valence: usize) -> AsymptoticNet {
-    let sector = std::f64::consts::TAU / valence as f64;
-    // Along the straight lines of the saddle for six, beside them otherwise.
-    let first = if valence == 6 { std::f64::consts::FRAC_PI_6 } else { 0.2 };
-    let lift = |x: f64, y: f64| DVec3::new(x, y, 0.02 * (x.powi(3) - 3.0 * x * y * y));
-    let at = |r: f64, a: f64| lift(r * a.cos(), r * a.sin());
-    let mut positions = vec![DVec3::ZERO];
-    positions.extend((0..valence).map(|k| at(1.0, first + sector * k as f64)));
-    positions.extend((0..valence).map(|k| at(1.35, first + sector * (k as f64 + 0.5))));
-    let mut curves = Vec::new();
-    let mut add = |a: usize, b: usize, bend: f64| {
-        let chord = positions[b] - positions[a];
-        // Tangents turned off the chord and laid into the tangent planes, curvature to match.
-        let arm = |v: usize, d: DVec3, angle: f64| {
-            let (p, d) = (positions[v], geom_core::DMat3::from_rotation_z(angle).mul_vec3(d));
-            let slope = 0.06 * ((p.x * p.x - p.y * p.y) * d.x - 2.0 * p.x * p.y * d.y);
-            DVec3::new(d.x, d.y, slope) * 0.2
-        };
-        let k = 2.0 * bend / chord.length();
-        curves.push(NetCurve {
-            ends: [a, b],
-            arms: [arm(a, chord, -bend), arm(b, -chord, bend)],
-            curvatures: [k, -k],
-            line: false,
-            inflections: 0,
-        });
-    };
-    for k in 0..valence {
-        let next = (k + 1) % valence;
-        add(0, 1 + k, 0.15);
-        add(1 + k, 1 + valence + k, -0.12);
-        add(1 + valence + k, 1 + next, -0.12);
-    }
-    let quads: Vec<[usize; 4]> =
-        (0..valence).map(|k| [0, 1 + k, 1 + valence + k, 1 + (k + 1) % valence]).collect();
-    AsymptoticNet::new(positions, &quads, curves).unwrap()
-}
-
+/// Odd vertices are flat, sixfold ones alternate (the fixtures of the same names are these nets).
 #[test]
 fn odd_vertices_are_flat_and_sixfold_vertices_alternate() {
     for valence in [3, 6] {
         let net = star(valence);
         let options = GridshellOptions::default();
-        match fill_net(&net, &options) {
-            Ok(shell) => {
-                let check = shell.verify(&net, &options.patch);
-                let kink = check.kink().to_degrees();
-                let sine = check.patches.iter().map(|p| p.sine).fold(1.0, f64::min);
-                println!("valence {valence}: kink {kink:e} sine {sine} {:?}", check.warnings);
-                let torsions: Vec<f64> = (0..net.curves().len())
-                    .filter(|i| net.curves()[*i].ends[0] == 0)
-                    .map(|i| shell.boundary.curves[i].jet(0.0).torsion())
-                    .collect();
-                println!("{torsions:?}");
-                assert!(kink < 1e-8 && sine > 0.5);
-                if valence % 2 == 1 {
-                    assert!(torsions.iter().all(|t| t.abs() < 1e-10));
-                } else {
-                    assert!(torsions.windows(2).all(|w| (w[0] + w[1]).abs() < 1e-9));
-                    assert!(torsions[0].abs() > 1e-4);
-                }
-            }
-            Err(error) => panic!("valence {valence}: {error}"),
+        let shell = fill_net(&net, &options).unwrap();
+        let check = shell.verify(&net, &options.patch);
+        let kink = check.kink().to_degrees();
+        let sine = check.patches.iter().map(|p| p.sine).fold(1.0, f64::min);
+        let normal = check.patches.iter().map(|p| p.normal_curvature).fold(0.0, f64::max);
+        println!("valence {valence}: kink {kink:e} sine {sine} {:?}", check.warnings);
+        assert!(kink < 1e-8 && sine > 0.5 && normal < 1e-10);
+        let torsions: Vec<f64> = (0..net.curves().len())
+            .filter(|i| net.curves()[*i].ends[0] == 0)
+            .map(|i| shell.boundary.curves[i].jet(0.0).torsion())
+            .collect();
+        // The middle vertex is corner 00 of every patch.
+        let gauss: Vec<f64> =
+            shell.patches.iter().map(|p| p.patch.jet(0.0, 0.0).gaussian_curvature()).collect();
+        let told: Vec<String> = check.warnings.iter().map(ToString::to_string).collect();
+        let words = format!(
+            "vertex 0: interior vertex of odd valence {valence}; torsion and Gaussian curvature are zero there"
+        );
+        if valence % 2 == 1 {
+            assert!(torsions.iter().all(|t| t.abs() < 1e-10));
+            assert!(gauss.iter().all(|k| k.abs() < 1e-10), "{gauss:?}");
+            assert!(told.contains(&words), "{told:?}");
+        } else {
+            assert!(torsions.windows(2).all(|w| (w[0] + w[1]).abs() < 1e-9));
+            assert!(torsions[0].abs() > 1e-4);
+            let want = -torsions[0] * torsions[0];
+            assert!(gauss.iter().all(|k| (k - want).abs() < 1e-9), "{gauss:?}");
+            assert!(!told.contains(&words));
         }
     }
 }

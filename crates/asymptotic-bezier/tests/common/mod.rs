@@ -3,7 +3,7 @@
 #![allow(dead_code, reason = "each test file uses its share")]
 #![allow(clippy::unwrap_used, reason = "recorded data; a wrong file should stop the test")]
 
-use asymptotic_bezier::{CornerData, Curvatures};
+use asymptotic_bezier::{AsymptoticNet, BezierCurve, CornerData, Curvatures, NetCurve};
 use geom_core::DVec3;
 use serde_json::Value;
 
@@ -107,7 +107,7 @@ pub(crate) fn exact_net(
     surface: impl Fn(f64, f64) -> DVec3 + Copy,
     window: [f64; 4],
     [n, m]: [usize; 2],
-) -> asymptotic_bezier::AsymptoticNet {
+) -> AsymptoticNet {
     let [p0, p1, q0, q1] = window;
     let at = |s: f64, t: f64| surface(p0 + (p1 - p0) * s, q0 + (q1 - q0) * t);
     let mesh = sampled_net(surface, window, [n, m]);
@@ -116,7 +116,7 @@ pub(crate) fn exact_net(
     let mut add = |a: (usize, usize), b: (usize, usize)| {
         let u = b.0 > a.0;
         let step = if u { 1.0 / n as f64 } else { 1.0 / m as f64 };
-        let mut curve = asymptotic_bezier::NetCurve {
+        let mut curve = NetCurve {
             ends: [a.0 * (m + 1) + a.1, b.0 * (m + 1) + b.1],
             arms: [DVec3::ZERO; 2],
             curvatures: [0.0; 2],
@@ -153,7 +153,7 @@ pub(crate) fn exact_net(
             [corners[0], corners[1], corners[2], corners[3]]
         })
         .collect();
-    asymptotic_bezier::AsymptoticNet::new(mesh.positions().to_vec(), &quads, curves).unwrap()
+    AsymptoticNet::new(mesh.positions().to_vec(), &quads, curves).unwrap()
 }
 
 /// Reproducible standard normal numbers.
@@ -240,4 +240,86 @@ pub(crate) fn corner_data(
     }
     data.curvatures = Curvatures::Signed(k);
     data
+}
+
+/// `valence` quads around the origin with the tangent planes of `z = h Re wᵐ`; arms turn alike, so
+/// that no curve has an inflection. Around an odd vertex `K` cannot be negative everywhere.
+pub(crate) fn star(valence: usize) -> AsymptoticNet {
+    let sector = std::f64::consts::TAU / valence as f64;
+    // Along the straight lines of the saddle for six, beside them otherwise.
+    let first = if valence == 6 { std::f64::consts::FRAC_PI_6 } else { 0.2 };
+    // Re wᵐ: as many waves as odd vertices have arms, three for the monkey saddle.
+    let m = if valence % 2 == 1 { valence as i32 } else { 3 };
+    let height = 0.06 / f64::from(m);
+    let lift = |x: f64, y: f64| {
+        let (r, a) = (x.hypot(y), y.atan2(x));
+        DVec3::new(x, y, height * r.powi(m) * (f64::from(m) * a).cos())
+    };
+    let at = |r: f64, a: f64| lift(r * a.cos(), r * a.sin());
+    let mut positions = vec![DVec3::ZERO];
+    positions.extend((0..valence).map(|k| at(1.0, first + sector * k as f64)));
+    positions.extend((0..valence).map(|k| at(1.35, first + sector * (k as f64 + 0.5))));
+    let mut curves = Vec::new();
+    let mut add = |a: usize, b: usize, bend: f64| {
+        let chord = positions[b] - positions[a];
+        // Tangents turned off the chord and laid into the tangent planes, curvature to match.
+        let arm = |v: usize, d: DVec3, angle: f64| {
+            let (p, d) = (positions[v], geom_core::DMat3::from_rotation_z(angle).mul_vec3(d));
+            let (r, a) = (p.x.hypot(p.y), p.y.atan2(p.x) * f64::from(m - 1));
+            let slope = 0.06 * r.powi(m - 1) * (a.cos() * d.x - a.sin() * d.y);
+            DVec3::new(d.x, d.y, slope) * 0.2
+        };
+        let k = 2.0 * bend / chord.length();
+        curves.push(NetCurve {
+            ends: [a, b],
+            arms: [arm(a, chord, -bend), arm(b, -chord, bend)],
+            curvatures: [k, -k],
+            line: false,
+            inflections: 0,
+        });
+    };
+    for k in 0..valence {
+        let next = (k + 1) % valence;
+        add(0, 1 + k, 0.15);
+        add(1 + k, 1 + valence + k, -0.12);
+        add(1 + valence + k, 1 + next, -0.12);
+    }
+    let quads: Vec<[usize; 4]> =
+        (0..valence).map(|k| [0, 1 + k, 1 + valence + k, 1 + (k + 1) % valence]).collect();
+    AsymptoticNet::new(positions, &quads, curves).unwrap()
+}
+
+/// Data near `z = x y` whose side `r1` is a quintic `(t, y, z)` with `y″ = w`, `z″ = t w`,
+/// `w = (t − 0.3)(t − 0.7)`: two inflections. With the torsions at its ends and the roots of `w`.
+pub(crate) fn wave() -> (CornerData, [f64; 2], [f64; 2]) {
+    // Twice integrated, from the constant term up.
+    let y = [0.0, 0.0, 0.21 / 2.0, -1.0 / 6.0, 1.0 / 12.0, 0.0];
+    let z = [0.0, 0.0, 0.0, 0.21 / 6.0, -1.0 / 12.0, 1.0 / 20.0];
+    let choose =
+        |n: f64, k: usize| (0..k).map(|i| (n - i as f64) / (i + 1) as f64).product::<f64>();
+    let bezier = |a: [f64; 6], j: usize| -> f64 {
+        (0..=j).map(|i| choose(j as f64, i) / choose(5.0, i) * a[i]).sum()
+    };
+    let points: Vec<DVec3> =
+        (0..6).map(|j| DVec3::new(j as f64 / 5.0, bezier(y, j), bezier(z, j))).collect();
+    let curve = BezierCurve::new(points.clone());
+    let jets = [curve.jet(0.0), curve.jet(1.0)];
+    // The other sides are straight, `r4` in the tangent plane at the end of `r1`.
+    let across = DVec3::new(0.0, 1.0, 1.0);
+    let corners = [points[0], points[5], DVec3::Y, points[5] + across];
+    let along = |i: usize, t: f64| {
+        let [a, b]: [usize; 2] = [[0, 1], [0, 2], [2, 3], [1, 3]][i];
+        corners[a].lerp(corners[b], t)
+    };
+    let mut data = CornerData {
+        corners,
+        start_points: std::array::from_fn(|i| along(i, 0.2)),
+        end_points: std::array::from_fn(|i| along(i, 0.8)),
+        curvatures: Curvatures::Signed([jets.map(|j| j.curvature()), [0.0; 2], [0.0; 2], [0.0; 2]]),
+        lines: [false, true, true, true],
+        inflections: [2, 0, 0, 0],
+    };
+    data.start_points[0] = points[1];
+    data.end_points[0] = points[4];
+    (data, jets.map(|j| j.torsion()), [0.3, 0.7])
 }
