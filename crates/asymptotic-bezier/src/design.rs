@@ -1,9 +1,10 @@
 //! From input to measured result in one call: what the command line runs.
 
-use crate::boundary::{Boundary, BoundaryOptions};
+use crate::boundary::{Boundary, BoundaryOptions, solve_boundary};
 use crate::data::{AsymptoticNet, CURVE_CORNERS, CornerData};
 use crate::error::{AsymptoticError, Place};
-use crate::gridshell::{Gridshell, GridshellCheck, GridshellOptions, fill_net};
+use crate::gridshell::{Gridshell, GridshellCheck, fill_solved};
+use crate::joint::Joins;
 use crate::patch::{PatchOptions, fill_patch};
 use crate::quad::{Quadrilateral, doubt_signs, solve_quadrilateral};
 use crate::quartic::solve_quartic_quadrilateral;
@@ -25,6 +26,8 @@ pub struct DesignOptions {
     pub boundary: BoundaryOptions,
     /// How the faces are filled.
     pub patch: PatchOptions,
+    /// How the patches of a net join.
+    pub joins: Joins,
     /// Moves tangents and curvatures where they are bad.
     pub relax: Option<RelaxOptions>,
 }
@@ -38,6 +41,8 @@ pub struct Design {
     pub shell: Gridshell,
     /// Measurements and all warnings.
     pub check: GridshellCheck,
+    /// With C1 and G2 joins, the largest jump of the mean curvature that G1 joins would leave.
+    pub mean_jump_before: Option<f64>,
     /// What the relaxed mode did, when asked for.
     pub relaxed: Option<Relaxed>,
 }
@@ -57,10 +62,17 @@ pub fn design(input: &Input, options: &DesignOptions) -> Result<Design, Asymptot
                 net = relaxed.net.clone();
                 boundary.torsions = relaxed.torsions.clone();
             }
-            let shell_options = GridshellOptions { boundary, patch: options.patch.clone() };
-            let shell = fill_net(&net, &shell_options)?;
+            let boundary = solve_boundary(&net, &boundary)?;
+            let mean_jump_before = match options.joins {
+                Joins::G1 => None,
+                // Where G1 patches fold there is nothing to compare with.
+                _ => fill_solved(&net, boundary.clone(), &options.patch, Joins::G1).ok().map(
+                    |shell| shell.check_joins(&net).iter().map(|j| j.mean_jump).fold(0.0, f64::max),
+                ),
+            };
+            let shell = fill_solved(&net, boundary, &options.patch, options.joins)?;
             let check = shell.verify(&net, &options.patch);
-            Ok(Design { net, shell, check, relaxed })
+            Ok(Design { net, shell, check, mean_jump_before, relaxed })
         }
     }
 }
@@ -86,7 +98,7 @@ fn design_patch(data: &CornerData, options: &DesignOptions) -> Result<Design, As
     let shell = shell_of_one(&net, quad, &options.patch)?;
     let mut check = shell.verify(&net, &options.patch);
     check.warnings.extend(doubt);
-    Ok(Design { net, shell, check, relaxed })
+    Ok(Design { net, shell, check, mean_jump_before: None, relaxed })
 }
 
 fn shell_of_one(
@@ -122,6 +134,7 @@ fn shell_of_one(
         qualities: quad.qualities.to_vec(),
         patches: vec![filled],
         outlines: vec![quad.boundary],
+        continuous: vec![false; 4],
         warnings,
     })
 }
@@ -141,6 +154,12 @@ pub struct DesignMetrics {
     pub thin_plate_energy: f64,
     /// Largest angle between normals across a shared curve.
     pub kink_max_deg: f64,
+    /// Largest jump of the Gaussian curvature across a shared curve.
+    pub gaussian_jump_max: f64,
+    /// Largest jump of the mean curvature across a shared curve.
+    pub mean_jump_max: f64,
+    /// Shared curves whose patches have one cross derivative.
+    pub continuous_joins: usize,
     /// Least sine between parameter lines.
     pub min_sine: f64,
     /// Share of the samples with `K > 0`.
@@ -168,6 +187,9 @@ impl Design {
             strain_energy: self.shell.boundary.strain_energy,
             thin_plate_energy: self.shell.thin_plate_energy(),
             kink_max_deg: self.check.kink().to_degrees(),
+            gaussian_jump_max: self.check.joins.iter().map(|j| j.gaussian_jump).fold(0.0, f64::max),
+            mean_jump_max: self.check.mean_jump(),
+            continuous_joins: self.shell.continuous.iter().filter(|c| **c).count(),
             min_sine: checks.iter().map(|c| c.sine).fold(1.0, f64::min),
             positive_gauss_fraction: checks.iter().map(|c| c.positive_gauss).sum::<f64>()
                 / checks.len().max(1) as f64,

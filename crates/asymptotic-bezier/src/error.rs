@@ -112,6 +112,9 @@ pub enum AsymptoticError {
         "{place}: the patch folds along {curve} (transversality {worst:.3} of the corner values at t = {t:.3}) and the bounds cannot be met at bi-{degree}; raise the degree or mend the corner data"
     )]
     Folded { place: Place, curve: Place, worst: f64, t: f64, degree: usize },
+    /// The system of all patches together.
+    #[error("the system of all patches cannot be solved ({0}); fill them with G1 joins")]
+    Joint(#[source] gp_solver::SolverError),
     /// Degree outside what the construction offers.
     #[error("degree {degree} of the {what} is outside {min}..={max}")]
     Degree { what: &'static str, degree: usize, min: usize, max: usize },
@@ -183,6 +186,11 @@ pub enum AsymptoticWarning {
     /// The degree asked for did not work and a higher one was taken.
     #[error("{place}: bi-{from} was not regular, bi-{to} is used")]
     DegreeRaised { place: Place, from: usize, to: usize },
+    /// A patch of a joint fill folds.
+    #[error(
+        "{place}: with {shared} of its joins C1 the patch folds; use G1 joins or a higher degree"
+    )]
+    JointFold { place: Place, shared: usize },
     /// Neighbouring normals far apart: the surface folds or has a singular point.
     #[error(
         "{place}: neighbouring normals turn by {degrees:.0} degrees, the patch is singular or folds there"

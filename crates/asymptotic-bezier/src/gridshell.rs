@@ -11,6 +11,7 @@ use crate::boundary::{Boundary, BoundaryOptions, solve_boundary};
 use crate::curve::CurveQuality;
 use crate::data::AsymptoticNet;
 use crate::error::{AsymptoticError, AsymptoticWarning, Place};
+use crate::joint::{Joins, fill_joint};
 use crate::patch::{FilledPatch, PatchBoundary, PatchOptions, fill_patch};
 use crate::quad::check_curve;
 use crate::surface::{BasisTable, Patch, PatchJet};
@@ -24,8 +25,11 @@ const JOIN_SAMPLES: usize = 41;
 pub struct GridshellOptions {
     /// How the curves are solved.
     pub boundary: BoundaryOptions,
-    /// How the faces are filled.
+    /// How the faces are filled; with C1 and G2 joins the tangent module, thin plates and one degree
+    /// (two more than the curves unless given) for all.
     pub patch: PatchOptions,
+    /// How the patches join.
+    pub joins: Joins,
 }
 
 /// A filled net.
@@ -39,6 +43,8 @@ pub struct Gridshell {
     pub patches: Vec<FilledPatch>,
     /// The boundary each patch was filled from.
     pub outlines: Vec<PatchBoundary>,
+    /// Whether the patches at a curve were given a common cross derivative.
+    pub continuous: Vec<bool>,
     /// Everything worth a word so far; [`Gridshell::verify`] adds what it finds.
     pub warnings: Vec<AsymptoticWarning>,
 }
@@ -50,6 +56,8 @@ pub struct JoinCheck {
     pub curve: usize,
     /// Largest angle between the normals of the two patches, radians.
     pub kink: f64,
+    /// Largest difference of the cross derivatives over their length; zero for C1 joins.
+    pub derivative_jump: f64,
     /// Largest jump of the Gaussian curvature.
     pub gaussian_jump: f64,
     /// Largest jump of the mean curvature, the quality left open by G1 joins.
@@ -76,7 +84,7 @@ pub fn fill_net(
     options: &GridshellOptions,
 ) -> Result<Gridshell, AsymptoticError> {
     let boundary = solve_boundary(net, &options.boundary)?;
-    fill_solved(net, boundary, &options.patch)
+    fill_solved(net, boundary, &options.patch, options.joins)
 }
 
 /// Fills a net whose curves are solved already.
@@ -84,6 +92,7 @@ pub(crate) fn fill_solved(
     net: &AsymptoticNet,
     boundary: Boundary,
     options: &PatchOptions,
+    joins: Joins,
 ) -> Result<Gridshell, AsymptoticError> {
     let inflections = &boundary.inflections;
     let mut warnings = boundary.warnings.clone();
@@ -116,6 +125,11 @@ pub(crate) fn fill_solved(
             }),
         })
         .collect();
+    if joins != Joins::G1 {
+        let (patches, continuous) = fill_joint(net, &boundary, &outlines, options.degree, joins)?;
+        warnings.extend(patches.iter().flat_map(|p| p.warnings.iter().cloned()));
+        return Ok(Gridshell { boundary, qualities, patches, outlines, continuous, warnings });
+    }
     let filled: Vec<Result<FilledPatch, AsymptoticError>> = outlines
         .par_iter()
         .enumerate()
@@ -123,7 +137,8 @@ pub(crate) fn fill_solved(
         .collect();
     let patches = filled.into_iter().collect::<Result<Vec<FilledPatch>, AsymptoticError>>()?;
     warnings.extend(patches.iter().flat_map(|p| p.warnings.iter().cloned()));
-    Ok(Gridshell { boundary, qualities, patches, outlines, warnings })
+    let continuous = vec![false; boundary.curves.len()];
+    Ok(Gridshell { boundary, qualities, patches, outlines, continuous, warnings })
 }
 
 /// Direction fields across the lines that two patches share.
@@ -174,13 +189,23 @@ impl Gridshell {
             .zip(&self.outlines)
             .map(|(filled, outline)| PatchCheck::new(&filled.patch, outline))
             .collect();
+        let warnings_of =
+            |f: usize, check: &PatchCheck| check.warnings(Place::Patch(f), options.min_sine);
+        let mut warnings = self.warnings.clone();
+        warnings.extend(patches.iter().enumerate().flat_map(|(f, c)| warnings_of(f, c)));
+        GridshellCheck { patches, joins: self.check_joins(net), warnings }
+    }
+
+    /// Measures every join.
+    #[must_use]
+    pub fn check_joins(&self, net: &AsymptoticNet) -> Vec<JoinCheck> {
         let mut sides: Vec<Vec<(usize, usize)>> = vec![Vec::new(); net.curves().len()];
         for (f, face) in net.faces().iter().enumerate() {
             for (k, c) in face.curves.iter().enumerate() {
                 sides[*c].push((f, k));
             }
         }
-        let joins: Vec<JoinCheck> = sides
+        sides
             .par_iter()
             .enumerate()
             .filter_map(|(curve, sides)| {
@@ -191,12 +216,7 @@ impl Gridshell {
                 };
                 Some(check_join(curve, &side(a), &side(b)))
             })
-            .collect();
-        let mut warnings = self.warnings.clone();
-        for (f, check) in patches.iter().enumerate() {
-            warnings.extend(check.warnings(Place::Patch(f), options.min_sine));
-        }
-        GridshellCheck { patches, joins, warnings }
+            .collect()
     }
 }
 
@@ -206,10 +226,17 @@ impl GridshellCheck {
     pub fn kink(&self) -> f64 {
         self.joins.iter().map(|j| j.kink).fold(0.0, f64::max)
     }
+
+    /// Largest jump of the mean curvature over the shared curves; zero when there are none.
+    #[must_use]
+    pub fn mean_jump(&self) -> f64 {
+        self.joins.iter().map(|j| j.mean_jump).fold(0.0, f64::max)
+    }
 }
 
-/// Jets along side `k` (`r1..r4`) of a patch, in the direction of the net curve.
-fn side_jets(patch: &Patch, k: usize, reversed: bool) -> Vec<PatchJet> {
+/// Jets along side `k` (`r1..r4`) of a patch and its inward derivatives, in the direction of the
+/// net curve.
+fn side_jets(patch: &Patch, k: usize, reversed: bool) -> Vec<(PatchJet, DVec3)> {
     let along = BasisTable::uniform(patch.degree(), JOIN_SAMPLES);
     let ends = BasisTable::new(patch.degree(), &[0.0, 1.0]);
     let end = usize::from(k >= 2);
@@ -222,14 +249,18 @@ fn side_jets(patch: &Patch, k: usize, reversed: bool) -> Vec<PatchJet> {
             } else {
                 patch.jet_at(&ends, end, &along, s, &mut jet);
             }
-            jet
+            let inward = [jet.v, jet.u, -jet.v, -jet.u][k];
+            (jet, inward)
         })
         .collect()
 }
 
-fn check_join(curve: usize, a: &[PatchJet], b: &[PatchJet]) -> JoinCheck {
-    let mut out = JoinCheck { curve, kink: 0.0, gaussian_jump: 0.0, mean_jump: 0.0 };
-    for (a, b) in a.iter().zip(b) {
+fn check_join(curve: usize, a: &[(PatchJet, DVec3)], b: &[(PatchJet, DVec3)]) -> JoinCheck {
+    let mut out =
+        JoinCheck { curve, kink: 0.0, derivative_jump: 0.0, gaussian_jump: 0.0, mean_jump: 0.0 };
+    for ((a, inward), (b, other)) in a.iter().zip(b) {
+        let jump = (*inward + *other).length() / inward.length();
+        out.derivative_jump = out.derivative_jump.max(jump);
         let (m, n) = (a.normal(), b.normal());
         // The arc cosine would lose half the digits of small angles.
         let kink = m.cross(n).length().atan2(m.dot(n));

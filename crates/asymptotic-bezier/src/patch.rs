@@ -14,10 +14,10 @@ use crate::surface::Patch;
 use geom_core::linalg::{Matrix, affine_space, axpy, dot, minimize_quadratic};
 
 /// Rank tolerance of the corner equations after scaling of the columns.
-const RANK_TOL: f64 = 1e-10;
+pub(crate) const RANK_TOL: f64 = 1e-10;
 
 /// Largest residual of the corner equations relative to the patch.
-const CORNER_TOL: f64 = 1e-8;
+pub(crate) const CORNER_TOL: f64 = 1e-8;
 
 /// Which tangent fields are used.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -89,14 +89,14 @@ pub struct FilledPatch {
 }
 
 /// A sparse vector equation: coefficients by column, and the right side.
-type VectorEquation = (Vec<(usize, DVec3)>, DVec3);
+pub(crate) type VectorEquation = (Vec<(usize, DVec3)>, DVec3);
 
 /// Curve and end at the corners `00`, `10`, `01`, `11`: the u-curve, then the v-curve.
-const CORNERS: [[(usize, usize); 2]; 4] =
+pub(crate) const CORNERS: [[(usize, usize); 2]; 4] =
     [[(0, 0), (1, 0)], [(0, 1), (3, 0)], [(2, 0), (1, 1)], [(2, 1), (3, 1)]];
 
 /// Whether the inward direction at curve `i` is with (`+1`) or against (`−1`) the parameter.
-const INWARD: [f64; 4] = [1.0, 1.0, -1.0, -1.0];
+pub(crate) const INWARD: [f64; 4] = [1.0, 1.0, -1.0, -1.0];
 
 /// Fills one boundary; `place` names the patch in messages.
 ///
@@ -237,6 +237,14 @@ impl PatchFamily {
                 Ansatz::PaperFree => paper_ansatz(curve, true),
             }
         });
+        let mut family = Self::framed(boundary, n, spaces);
+        family.solve_corners(place)?;
+        family.reduce();
+        Ok(family)
+    }
+
+    /// Boundary rows and spaces; the coefficients of the fields are still to be solved for.
+    pub(crate) fn framed(boundary: &PatchBoundary, n: usize, spaces: [FieldSpace; 4]) -> Self {
         let origin = boundary.curves[0].points()[0];
         let rows: [Vec<DVec3>; 4] = std::array::from_fn(|i| {
             let curve = &boundary.curves[i];
@@ -247,7 +255,7 @@ impl PatchFamily {
         for i in 0..4 {
             offsets[i + 1] = offsets[i] + spaces[i].fields.len();
         }
-        let mut family = Self {
+        Self {
             degree: n,
             origin,
             rows,
@@ -259,10 +267,7 @@ impl PatchFamily {
             slopes: Default::default(),
             hessian: Matrix::default(),
             gradient: Vec::new(),
-        };
-        family.solve_corners(place)?;
-        family.reduce();
-        Ok(family)
+        }
     }
 
     /// Position on the second row of curve `i` at index `k`, affine in the field coefficients.
@@ -277,15 +282,16 @@ impl PatchFamily {
         (self.rows[i][k], columns)
     }
 
-    /// Tangents and twists at the four corners; each corner alone when the fields allow it.
-    fn solve_corners(&mut self, place: Place) -> Result<(), AsymptoticError> {
-        let (n, total) = (self.degree, self.offsets[4]);
-        let scale: Vec<f64> = self
-            .spaces
-            .iter()
-            .flat_map(|s| &s.fields)
-            .map(|f| f.iter().map(|c| c.abs().max_element()).fold(0.0, f64::max).recip())
-            .collect();
+    /// Unit of each field's coefficient.
+    pub(crate) fn scales(&self) -> Vec<f64> {
+        let largest =
+            |f: &Vec<DVec3>| f.iter().map(|c| c.abs().max_element()).fold(0.0, f64::max).recip();
+        self.spaces.iter().flat_map(|s| &s.fields).map(largest).collect()
+    }
+
+    /// Both tangents and the twist at the corners `00`, `10`, `01`, `11`.
+    pub(crate) fn corner_equations(&self) -> Vec<[VectorEquation; 3]> {
+        let n = self.degree;
         let mut equations: Vec<[VectorEquation; 3]> = Vec::with_capacity(4);
         for [(p, pe), (q, qe)] in CORNERS {
             let at = |e: usize, k: usize| if e == 0 { k } else { n - k };
@@ -299,6 +305,14 @@ impl PatchFamily {
             columns.extend(q_columns.map(|(c, d)| (c, -d)));
             equations.push([tangent_p, tangent_q, (columns, q1 - p1)]);
         }
+        equations
+    }
+
+    /// Tangents and twists at the four corners; each corner alone when the fields allow it.
+    fn solve_corners(&mut self, place: Place) -> Result<(), AsymptoticError> {
+        let total = self.offsets[4];
+        let scale = self.scales();
+        let equations = self.corner_equations();
         let mut owner = vec![usize::MAX; total];
         let mut separate = true;
         for (c, corner) in equations.iter().enumerate() {
@@ -348,9 +362,7 @@ impl PatchFamily {
                 null_columns.push(vec![(c, scale[c])]);
             }
         }
-        let size = self.rows[0].iter().chain(&self.rows[2]);
-        let size = size.map(|q| (*q - self.rows[0][0]).length()).fold(0.0, f64::max);
-        if !(worst <= CORNER_TOL * size) {
+        if !(worst <= CORNER_TOL * self.size()) {
             return Err(AsymptoticError::CornerEquations { place, residual: worst });
         }
         self.particular = particular;
@@ -363,8 +375,13 @@ impl PatchFamily {
         Ok(())
     }
 
+    /// Largest distance of a point of `r1` or `r3` from the corner `00`.
+    pub(crate) fn size(&self) -> f64 {
+        self.rows[0].iter().chain(&self.rows[2]).map(|q| q.length()).fold(0.0, f64::max)
+    }
+
     /// Second ring and energy in terms of the freedoms.
-    fn reduce(&mut self) {
+    pub(crate) fn reduce(&mut self) {
         let (n, ny) = (self.degree, self.null.cols());
         let table = fill_table(n);
         let mut second = Vec::with_capacity(table.second.len());
@@ -405,7 +422,7 @@ impl PatchFamily {
         self.gradient = gradient;
     }
 
-    fn border_point(&self, (i, j): (usize, usize)) -> DVec3 {
+    pub(crate) fn border_point(&self, (i, j): (usize, usize)) -> DVec3 {
         let n = self.degree;
         match (i, j) {
             (_, 0) => self.rows[0][i],

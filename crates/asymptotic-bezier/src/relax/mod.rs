@@ -18,6 +18,7 @@ use crate::boundary::{
 use crate::data::{AsymptoticNet, CURVE_CORNERS, CornerData, Curvatures, INTO_IS_LEFT};
 use crate::error::AsymptoticError;
 use crate::gridshell::fill_solved;
+use crate::joint::Joins;
 use crate::patch::PatchOptions;
 use crate::quad::{TURNING_LIMIT, solve_quadrilateral};
 use crate::vertex::vertex_frames;
@@ -212,7 +213,7 @@ fn judge(
     let turning = turning.filter(|t| t.is_finite()).fold(0.0, f64::max);
     let small = relaxed.rms_move() <= options.rms_move && relaxed.max_move() <= options.max_move;
     if good && small {
-        let filled = fill_solved(net, boundary, &PatchOptions::default());
+        let filled = fill_solved(net, boundary, &PatchOptions::default(), Joins::G1);
         relaxed.acceptable = filled.is_ok_and(|shell| {
             shell.patches.iter().all(|p| p.patch.least_sine(32) >= options.min_sine)
         });

@@ -3,6 +3,8 @@
 #![allow(dead_code, reason = "each test file uses its share")]
 #![allow(clippy::unwrap_used, reason = "recorded data; a wrong file should stop the test")]
 
+pub(crate) mod star;
+
 use asymptotic_bezier::{AsymptoticNet, BezierCurve, CornerData, Curvatures, NetCurve};
 use geom_core::DVec3;
 use serde_json::Value;
@@ -240,53 +242,6 @@ pub(crate) fn corner_data(
     }
     data.curvatures = Curvatures::Signed(k);
     data
-}
-
-/// `valence` quads around the origin with the tangent planes of `z = h Re wᵐ`; arms turn alike, so
-/// that no curve has an inflection. Around an odd vertex `K` cannot be negative everywhere.
-pub(crate) fn star(valence: usize) -> AsymptoticNet {
-    let sector = std::f64::consts::TAU / valence as f64;
-    // Along the straight lines of the saddle for six, beside them otherwise.
-    let first = if valence == 6 { std::f64::consts::FRAC_PI_6 } else { 0.2 };
-    // Re wᵐ: as many waves as odd vertices have arms, three for the monkey saddle.
-    let m = if valence % 2 == 1 { valence as i32 } else { 3 };
-    let height = 0.06 / f64::from(m);
-    let lift = |x: f64, y: f64| {
-        let (r, a) = (x.hypot(y), y.atan2(x));
-        DVec3::new(x, y, height * r.powi(m) * (f64::from(m) * a).cos())
-    };
-    let at = |r: f64, a: f64| lift(r * a.cos(), r * a.sin());
-    let mut positions = vec![DVec3::ZERO];
-    positions.extend((0..valence).map(|k| at(1.0, first + sector * k as f64)));
-    positions.extend((0..valence).map(|k| at(1.35, first + sector * (k as f64 + 0.5))));
-    let mut curves = Vec::new();
-    let mut add = |a: usize, b: usize, bend: f64| {
-        let chord = positions[b] - positions[a];
-        // Tangents turned off the chord and laid into the tangent planes, curvature to match.
-        let arm = |v: usize, d: DVec3, angle: f64| {
-            let (p, d) = (positions[v], geom_core::DMat3::from_rotation_z(angle).mul_vec3(d));
-            let (r, a) = (p.x.hypot(p.y), p.y.atan2(p.x) * f64::from(m - 1));
-            let slope = 0.06 * r.powi(m - 1) * (a.cos() * d.x - a.sin() * d.y);
-            DVec3::new(d.x, d.y, slope) * 0.2
-        };
-        let k = 2.0 * bend / chord.length();
-        curves.push(NetCurve {
-            ends: [a, b],
-            arms: [arm(a, chord, -bend), arm(b, -chord, bend)],
-            curvatures: [k, -k],
-            line: false,
-            inflections: 0,
-        });
-    };
-    for k in 0..valence {
-        let next = (k + 1) % valence;
-        add(0, 1 + k, 0.15);
-        add(1 + k, 1 + valence + k, -0.12);
-        add(1 + valence + k, 1 + next, -0.12);
-    }
-    let quads: Vec<[usize; 4]> =
-        (0..valence).map(|k| [0, 1 + k, 1 + valence + k, 1 + (k + 1) % valence]).collect();
-    AsymptoticNet::new(positions, &quads, curves).unwrap()
 }
 
 /// Data near `z = x y` whose side `r1` is a quintic `(t, y, z)` with `y″ = w`, `z″ = t w`,
