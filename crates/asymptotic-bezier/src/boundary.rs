@@ -57,6 +57,13 @@ impl TorsionHandle {
         Self::Fixed((-curvature).max(0.0).sqrt().copysign(sign))
     }
 
+    /// The handle that keeps the Gaussian curvature between `min` and `max`, both at most zero.
+    #[must_use]
+    pub fn gaussian_between(min: f64, max: f64, sign: f64) -> Self {
+        let [large, small] = [min, max].map(|k| (-k).max(0.0).sqrt());
+        if sign < 0.0 { Self::Between(-large, -small) } else { Self::Between(small, large) }
+    }
+
     fn bounds(self) -> [f64; 2] {
         match self {
             Self::Free => [f64::NEG_INFINITY, f64::INFINITY],

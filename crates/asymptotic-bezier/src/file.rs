@@ -5,10 +5,11 @@ use std::collections::BTreeMap;
 use geom_core::DVec3;
 use serde::{Deserialize, Serialize};
 
-use crate::boundary::TorsionHandle;
+use crate::boundary::{TorsionHandle, arm_signs, bilinear_torsions};
 use crate::data::{AsymptoticNet, CornerData, Curvatures, NetCurve};
 use crate::design::Input;
 use crate::error::AsymptoticError;
+use crate::vertex::vertex_frames;
 
 /// Content of an input file. Either the fields of a patch (`X`, `P_i1`, `P_i4` and `signed_k` or
 /// `unsigned_k`) or those of a net (`vertices`, `quads`, `curves`) are there.
@@ -87,17 +88,97 @@ pub enum TorsionWish {
     Fixed(f64),
     /// Between two values.
     Between(f64, f64),
-    /// The Gaussian curvature (at most zero) and the sign of the torsion.
+    /// The Gaussian curvature (at most zero) and the sign of the torsion; zero takes the twist of
+    /// the vertices around.
     Gaussian(f64, f64),
+    /// The Gaussian curvature between two values, and the sign.
+    GaussianBetween(f64, f64, f64),
 }
 
 impl TorsionWish {
-    fn handle(self) -> TorsionHandle {
+    /// What no vertex can have.
+    fn fault(self) -> Option<String> {
+        let numbers: &[f64] = match &self {
+            Self::Fixed(tau) => &[*tau],
+            Self::Between(min, max) => &[*min, *max],
+            Self::Gaussian(k, sign) => &[*k, *sign],
+            Self::GaussianBetween(min, max, sign) => &[*min, *max, *sign],
+        };
+        if numbers.iter().any(|n| n.is_nan()) {
+            return Some("a number is NaN; give numbers".into());
+        }
+        match self {
+            Self::Gaussian(k, _) | Self::GaussianBetween(_, k, _) if k > 0.0 => Some(format!(
+                "the Gaussian curvature {k} is above zero, but it is minus the torsion squared; give at most 0"
+            )),
+            _ => None,
+        }
+    }
+
+    /// The handle; `sign` is that of the torsion where the wish leaves it open.
+    fn handle(self, sign: f64) -> TorsionHandle {
+        let open = |wished: f64| if wished == 0.0 { sign } else { wished };
         match self {
             Self::Fixed(tau) => TorsionHandle::Fixed(tau),
             Self::Between(min, max) => TorsionHandle::Between(min, max),
-            Self::Gaussian(k, sign) => TorsionHandle::gaussian(k, sign),
+            Self::Gaussian(k, wished) => TorsionHandle::gaussian(k, open(wished)),
+            Self::GaussianBetween(min, max, wished) => {
+                TorsionHandle::gaussian_between(min, max, open(wished))
+            }
         }
+    }
+}
+
+/// The torsion handles per corner or vertex that wishes by corner name or vertex number stand for.
+///
+/// Wishes for the Gaussian curvature that leave the sign of the torsion open (zero) get that of
+/// the bilinear patches over the vertices.
+///
+/// # Errors
+/// [`AsymptoticError::Data`] names the wish without a corner or vertex.
+pub fn torsion_handles(
+    input: &Input,
+    wishes: &BTreeMap<String, TorsionWish>,
+) -> Result<Vec<TorsionHandle>, AsymptoticError> {
+    if wishes.is_empty() {
+        return Ok(Vec::new());
+    }
+    let twists = match input {
+        Input::Patch(data) => twist_signs(&data.to_net(data.curvatures.values())),
+        Input::Net(net) => twist_signs(net),
+    };
+    let mut handles = vec![TorsionHandle::Free; twists.len()];
+    for (name, wish) in wishes {
+        let found = match input {
+            Input::Patch(_) => CORNERS.iter().position(|c| c == name),
+            Input::Net(_) => name.parse::<usize>().ok().filter(|v| *v < handles.len()),
+        };
+        let Some(v) = found else {
+            let names = if matches!(input, Input::Patch(_)) {
+                "use 00, 10, 01 or 11".to_owned()
+            } else {
+                format!("use a vertex number below {}", handles.len())
+            };
+            return refuse(&format!("`torsions` has \"{name}\"; {names}"));
+        };
+        if let Some(message) = wish.fault() {
+            return refuse(&format!("`torsions` of \"{name}\": {message}"));
+        }
+        handles[v] = wish.handle(twists[v]);
+    }
+    Ok(handles)
+}
+
+/// Signs of the torsions that the bilinear patches of a net have; data at fault give `+1`, the
+/// solver names the fault.
+fn twist_signs(net: &AsymptoticNet) -> Vec<f64> {
+    let mut projected = net.clone();
+    match vertex_frames(&mut projected, f64::INFINITY) {
+        Ok(frames) => {
+            let torsions = bilinear_torsions(net, &arm_signs(net, &frames), &frames);
+            torsions.into_iter().map(f64::signum).collect()
+        }
+        Err(_) => vec![1.0; net.positions().len()],
     }
 }
 
@@ -112,17 +193,19 @@ impl DataFile {
     pub fn input(&self) -> Result<(Input, Vec<TorsionHandle>), AsymptoticError> {
         let is_net = self.vertices.is_some() || self.quads.is_some() || self.curves.is_some();
         let is_patch = self.corners.is_some();
-        match (is_net, is_patch) {
+        let input = match (is_net, is_patch) {
             (true, true) => refuse("both `X` and `vertices` are given; keep one of patch and net"),
             (false, false) => {
                 refuse("neither `X` nor `vertices` is given; one of patch and net is needed")
             }
             (true, false) => self.net(),
             (false, true) => self.patch(),
-        }
+        }?;
+        let handles = torsion_handles(&input, &self.torsions)?;
+        Ok((input, handles))
     }
 
-    fn patch(&self) -> Result<(Input, Vec<TorsionHandle>), AsymptoticError> {
+    fn patch(&self) -> Result<Input, AsymptoticError> {
         let corners = self.corners.as_ref().ok_or_else(|| missing("X"))?;
         let mut x = [DVec3::ZERO; 4];
         for (c, name) in CORNERS.iter().enumerate() {
@@ -145,13 +228,6 @@ impl DataFile {
                 return refuse("both `signed_k` and `unsigned_k` are given; keep one");
             }
         };
-        let mut handles = vec![TorsionHandle::Free; 4];
-        for (name, wish) in &self.torsions {
-            let Some(c) = CORNERS.iter().position(|c| c == name) else {
-                return refuse(&format!("`torsions` has \"{name}\"; use 00, 10, 01 or 11"));
-            };
-            handles[c] = wish.handle();
-        }
         let data = CornerData {
             corners: x,
             start_points: points(self.start_points, "P_i1")?,
@@ -160,10 +236,10 @@ impl DataFile {
             lines: self.lines.unwrap_or_default(),
             inflections: self.inflections.unwrap_or_default(),
         };
-        Ok((Input::Patch(Box::new(data)), handles))
+        Ok(Input::Patch(Box::new(data)))
     }
 
-    fn net(&self) -> Result<(Input, Vec<TorsionHandle>), AsymptoticError> {
+    fn net(&self) -> Result<Input, AsymptoticError> {
         let vertices = self.vertices.as_ref().ok_or_else(|| missing("vertices"))?;
         let quads = self.quads.as_ref().ok_or_else(|| missing("quads"))?;
         let curves = self.curves.as_ref().ok_or_else(|| missing("curves"))?;
@@ -189,18 +265,7 @@ impl DataFile {
                 inflections: c.inflections,
             })
             .collect();
-        let mut handles = vec![TorsionHandle::Free; positions.len()];
-        for (name, wish) in &self.torsions {
-            match name.parse::<usize>().ok().and_then(|v| handles.get_mut(v)) {
-                Some(handle) => *handle = wish.handle(),
-                None => {
-                    return refuse(&format!(
-                        "`torsions` has \"{name}\", which is no vertex number"
-                    ));
-                }
-            }
-        }
-        Ok((Input::Net(AsymptoticNet::new(positions, quads, curves)?), handles))
+        Ok(Input::Net(AsymptoticNet::new(positions, quads, curves)?))
     }
 
     /// The file that describes `data`.

@@ -103,36 +103,47 @@ impl AsymptoticNet {
             .map(|h| {
                 let back = mesh.twin(h);
                 let ends = [mesh.origin(h), mesh.target(h)];
-                let mut arms = [DVec3::ZERO; 2];
-                let mut curvatures = [0.0; 2];
-                for (e, half_edge) in [h, back].into_iter().enumerate() {
-                    let (first, second) = arm_derivatives(mesh, half_edge);
-                    let normal = normals[ends[e].index()];
-                    // Everything happens in the tangent plane, which the arms must share.
-                    let flat = |v: DVec3| v - normal * v.dot(normal);
-                    let (first, second) = (flat(first), flat(second));
-                    arms[e] = first / DATA_DEGREE as f64;
-                    curvatures[e] = first.cross(second).dot(normal) / first.length().powi(3);
-                }
+                let derivatives = [h, back].map(|h| arm_derivatives(mesh, h));
                 let chord = mesh.position(ends[1]) - mesh.position(ends[0]);
-                let line = (0..2).all(|e| {
-                    curvatures[e].abs() * chord.length() <= STRAIGHT_TOL
-                        && arms[e].cross(chord).length()
-                            <= STRAIGHT_TOL * arms[e].length() * chord.length()
-                });
-                if line {
-                    curvatures = [0.0; 2];
-                    for (arm, sign) in arms.iter_mut().zip([1.0, -1.0]) {
-                        *arm = chord * (sign * arm.length() / chord.length());
-                    }
-                }
-                // Equal signs mean opposite sides, because the arms point at one another.
-                let inflections = usize::from(!line && curvatures[0] * curvatures[1] > 0.0);
-                NetCurve { ends: ends.map(VertexId::index), arms, curvatures, line, inflections }
+                let normals = ends.map(|v| normals[v.index()]);
+                net_curve(ends.map(VertexId::index), chord, derivatives, normals)
             })
             .collect();
         Self::new(mesh.positions().to_vec(), &quads, curves)
     }
+}
+
+/// The curve with these first and second derivatives, by a parameter that runs over it once from
+/// each end, laid into the tangent planes.
+pub(crate) fn net_curve(
+    ends: [usize; 2],
+    chord: DVec3,
+    derivatives: [(DVec3, DVec3); 2],
+    normals: [DVec3; 2],
+) -> NetCurve {
+    let mut arms = [DVec3::ZERO; 2];
+    let mut curvatures = [0.0; 2];
+    for e in 0..2 {
+        let normal = normals[e];
+        // Everything happens in the tangent plane, which the arms must share.
+        let flat = |v: DVec3| v - normal * v.dot(normal);
+        let (first, second) = (flat(derivatives[e].0), flat(derivatives[e].1));
+        arms[e] = first / DATA_DEGREE as f64;
+        curvatures[e] = first.cross(second).dot(normal) / first.length().powi(3);
+    }
+    let line = (0..2).all(|e| {
+        curvatures[e].abs() * chord.length() <= STRAIGHT_TOL
+            && arms[e].cross(chord).length() <= STRAIGHT_TOL * arms[e].length() * chord.length()
+    });
+    if line {
+        curvatures = [0.0; 2];
+        for (arm, sign) in arms.iter_mut().zip([1.0, -1.0]) {
+            *arm = chord * (sign * arm.length() / chord.length());
+        }
+    }
+    // Equal signs mean opposite sides, because the arms point at one another.
+    let inflections = usize::from(!line && curvatures[0] * curvatures[1] > 0.0);
+    NetCurve { ends, arms, curvatures, line, inflections }
 }
 
 /// Normals from the derivatives along the arms, on the side of counter-clockwise faces.

@@ -63,7 +63,7 @@ fn noisy_net(net: &AsymptoticNet, sigma: f64, seed: u64) -> AsymptoticNet {
     }
     let quads: Vec<[usize; 4]> =
         net.faces().iter().map(|f| [0, 1, 3, 2].map(|c| net.face_corner(f, c))).collect();
-    AsymptoticNet::new(net.positions().to_vec(), &quads, curves).unwrap()
+    AsymptoticNet::new(net.positions().to_vec(), &quads, curves).expect("the net is sound")
 }
 
 /// The curves of a net are shorter than the sides of a lone patch of the same shape, and what they

@@ -1,18 +1,22 @@
 //! `umbilic asymptotic DATA -o OUT`.
 
+mod lamellas;
+mod page;
+
 use crate::args::{ConfigArgs, OutputArgs, ReportArgs, check_output_path};
 use crate::context::Context;
 use crate::failure::Failure;
 use crate::outcome::{Outcome, Status};
-use crate::report_support;
 use asymptotic_bezier::{
-    Ansatz, AsymptoticNet, BoundaryEnergy, DataFile, Design, DesignOptions, Input, Interior,
-    Lamella, LamellaOptions, RelaxOptions, TorsionHandle, design, lamellas, strip_layout,
+    Ansatz, AsymptoticNet, BoundaryEnergy, DataFile, Design, DesignOptions, Input, Interior, Joins,
+    RelaxOptions, TorsionHandle, TorsionWish, design, torsion_handles,
 };
 use bspline::{BsplineSurface, Degree, KnotVector};
-use exchange::{Drawing, DrawnLine, Label, LengthUnit, Mesh, Model, NamedSurface};
+use exchange::{LengthUnit, Mesh, Model, NamedSurface};
 use serde::Deserialize;
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
+use std::str::FromStr;
 
 /// Arguments of `asymptotic`.
 #[derive(Debug, clap::Args)]
@@ -20,7 +24,8 @@ use std::path::{Path, PathBuf};
     after_help = "Example:\n  umbilic asymptotic fixtures/asymptotic/catenoid.ron -o patch.step -o patch.glb"
 )]
 pub(crate) struct Asymptotic {
-    /// Corner data or a net of curves (RON), or with --from-net an asymptotic quad mesh
+    /// Corner data or a net of curves (RON), polylines of the curves (OBJ), or with --from-net an
+    /// asymptotic quad mesh or the net file of `umbilic hnet`
     data: PathBuf,
     #[command(flatten)]
     output: OutputArgs,
@@ -54,6 +59,17 @@ struct Options {
     /// Take the input for a quad mesh along asymptotic lines and estimate its curves
     #[arg(long, num_args = 0, default_missing_value = "true")]
     from_net: Option<bool>,
+    /// How patches of a net join: common tangent planes, common cross derivatives where the curves
+    /// allow it, or besides the least jump of the mean curvature
+    #[arg(long, value_enum)]
+    joins: Option<JoinsName>,
+    /// Torsion of the curves in the u-direction at a corner (00, 10, 01, 11) or vertex (its
+    /// number), as 00=1.2 or 00=0.5..2 (repeatable)
+    #[arg(long, value_name = "CORNER=T", allow_hyphen_values = true)]
+    torsion: Option<Vec<Wish>>,
+    /// Gaussian curvature at a corner or vertex, as 00=-0.4 or 00=-1..-0.2 (repeatable)
+    #[arg(long, value_name = "CORNER=K", allow_hyphen_values = true)]
+    gauss: Option<Vec<Wish>>,
     /// Move tangents and curvatures of bad data, a little and within limits
     #[arg(long, num_args = 0, default_missing_value = "true")]
     relaxed: Option<bool>,
@@ -82,6 +98,9 @@ crate::layered!(Options {
     boundary_degree,
     boundary_energy,
     from_net,
+    joins,
+    torsion,
+    gauss,
     relaxed,
     lamellas,
     lamella_width,
@@ -95,6 +114,43 @@ crate::layered!(Options {
 enum AnsatzName {
     Module,
     Paper,
+}
+
+#[derive(Clone, Copy, Debug, clap::ValueEnum, Deserialize)]
+#[serde(rename_all = "snake_case")]
+enum JoinsName {
+    G1,
+    C1,
+    G2,
+}
+
+/// One number or a range for a corner or vertex, `00=1.2` or `00=0.5..2`.
+#[derive(Clone, Debug, PartialEq)]
+struct Wish {
+    corner: String,
+    min: f64,
+    max: f64,
+}
+
+impl FromStr for Wish {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let number = |t: &str| t.trim().parse::<f64>().ok();
+        let wish = text.split_once('=').and_then(|(corner, value)| {
+            let (min, max) = value.split_once("..").unwrap_or((value, value));
+            Some(Self { corner: corner.trim().to_owned(), min: number(min)?, max: number(max)? })
+        });
+        wish.ok_or_else(|| {
+            format!("`{text}` is not of the form CORNER=NUMBER or CORNER=MIN..MAX, as in 00=0.5..2")
+        })
+    }
+}
+
+impl<'de> Deserialize<'de> for Wish {
+    fn deserialize<D: serde::Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        String::deserialize(deserializer)?.parse().map_err(serde::de::Error::custom)
+    }
 }
 
 #[derive(Clone, Copy, Debug, clap::ValueEnum, Deserialize)]
@@ -129,7 +185,7 @@ impl Asymptotic {
             check_output_path(&folder.join("lamellas.svg"))?;
         }
         check_sizes(&options)?;
-        let (input, handles, unit) = read_input(&self.data, options.from_net.unwrap_or(false))?;
+        let (input, handles, unit) = read_input(&self.data, &options)?;
         let settings = design_options(&options, handles);
         let result = design(&input, &settings).map_err(|e| Failure::input(&self.data, e))?;
         let acceptable = result.relaxed.as_ref().is_none_or(|r| r.acceptable);
@@ -145,16 +201,12 @@ impl Asymptotic {
             outcome.files.push((path, bytes));
         }
         if let Some(folder) = &options.lamellas {
-            outcome.files.extend(lamella_files(folder, &result, &options, &unit));
+            outcome.files.extend(lamellas::files(folder, &result, &options, &unit));
         }
         outcome.summary = summary(&result, &unit);
         outcome.warnings = result.check.warnings.iter().map(ToString::to_string).collect();
         if self.report.wanted() {
-            let mut report = report_support::new("Asymptotic patches");
-            let model = Model { surfaces: surfaces(&result)?, unit, ..Model::default() };
-            report_support::add_model(&mut report, &model)?;
-            report.histograms.extend(kinks(&result));
-            report_support::add_files(&mut outcome, &self.report, context, report)?;
+            page::add(&mut outcome, &self.report, context, &result, unit)?;
         }
         Ok(outcome)
     }
@@ -162,27 +214,57 @@ impl Asymptotic {
 
 fn read_input(
     path: &Path,
-    from_net: bool,
+    options: &Options,
 ) -> Result<(Input, Vec<TorsionHandle>, LengthUnit), Failure> {
-    if from_net {
-        let model = exchange::read_model(path).map_err(|e| Failure::input(path, e))?;
-        let mesh = model
-            .meshes
-            .first()
-            .ok_or_else(|| Failure::input(path, "no mesh in this file; give a quad mesh"))?;
-        let mesh = mesh.to_poly_mesh().map_err(|e| Failure::input(path, e))?;
-        let net = AsymptoticNet::from_mesh(&mesh).map_err(|e| Failure::input(path, e))?;
-        return Ok((Input::Net(net), Vec::new(), model.unit));
+    let refused = |e: &dyn std::fmt::Display| Failure::input(path, e);
+    let wishes = wishes(options);
+    let handles = |input: &Input| torsion_handles(input, &wishes).map_err(|e| refused(&e));
+    if options.from_net.unwrap_or(false) {
+        let (mesh, unit) = if exchange::extension_of(path) == "ron" {
+            let text = exchange::read_text(path).map_err(|e| refused(&e))?;
+            let net = exchange::read_net(&text).map_err(|e| refused(&e))?;
+            (net.to_poly_mesh().map_err(|e| refused(&e))?, LengthUnit::default())
+        } else {
+            let (mesh, unit, _) = crate::net_files::read_mesh(path)?;
+            (mesh, unit)
+        };
+        let input = Input::Net(AsymptoticNet::from_mesh(&mesh).map_err(|e| refused(&e))?);
+        let handles = handles(&input)?;
+        return Ok((input, handles, unit));
     }
-    let file: DataFile = exchange::read_ron(path).map_err(|e| Failure::input(path, e))?;
+    if exchange::extension_of(path) == "obj" {
+        let model = exchange::read_model(path).map_err(|e| refused(&e))?;
+        if model.meshes.iter().any(|m| !m.faces.is_empty()) {
+            return Err(refused(&"faces in a file of curves; with --from-net it is a quad mesh"));
+        }
+        let lines = model.meshes.iter().flat_map(|m| (0..m.lines.len()).map(|k| m.polyline(k)));
+        let polylines: Vec<Vec<geom_core::DVec3>> = lines.map(Iterator::collect).collect();
+        let net = AsymptoticNet::from_polylines(&polylines).map_err(|e| refused(&e))?;
+        let input = Input::Net(net);
+        let handles = handles(&input)?;
+        return Ok((input, handles, model.unit));
+    }
+    let mut file: DataFile = exchange::read_ron(path).map_err(|e| refused(&e))?;
     let unit = match &file.unit {
         None => LengthUnit::default(),
-        Some(symbol) => LengthUnit::from_symbol(symbol).ok_or_else(|| {
-            Failure::input(path, format!("unknown unit `{symbol}`; use mm, cm, m or in"))
-        })?,
+        Some(symbol) => LengthUnit::from_symbol(symbol)
+            .ok_or_else(|| refused(&format!("unknown unit `{symbol}`; use mm, cm, m or in")))?,
     };
-    let (input, handles) = file.input().map_err(|e| Failure::input(path, e))?;
+    file.torsions.extend(wishes);
+    let (input, handles) = file.input().map_err(|e| refused(&e))?;
     Ok((input, handles, unit))
+}
+
+/// What the flags wish of torsions and Gaussian curvatures.
+fn wishes(options: &Options) -> BTreeMap<String, TorsionWish> {
+    let mut out = BTreeMap::new();
+    for w in options.torsion.iter().flatten() {
+        out.insert(w.corner.clone(), TorsionWish::Between(w.min, w.max));
+    }
+    for w in options.gauss.iter().flatten() {
+        out.insert(w.corner.clone(), TorsionWish::GaussianBetween(w.min, w.max, 0.0));
+    }
+    out
 }
 
 fn design_options(options: &Options, handles: Vec<TorsionHandle>) -> DesignOptions {
@@ -208,6 +290,11 @@ fn design_options(options: &Options, handles: Vec<TorsionHandle>) -> DesignOptio
         Some(InteriorName::Dirichlet) => Interior::Dirichlet,
         Some(InteriorName::Bending) => Interior::Bending,
         Some(InteriorName::Coons) => Interior::Coons,
+    };
+    settings.joins = match options.joins {
+        None | Some(JoinsName::G1) => Joins::G1,
+        Some(JoinsName::C1) => Joins::C1,
+        Some(JoinsName::G2) => Joins::G2,
     };
     settings.relax = options.relaxed.unwrap_or(false).then(RelaxOptions::default);
     settings
@@ -237,29 +324,6 @@ fn model_for(path: &Path, result: &Design, unit: &LengthUnit) -> Result<Model, F
     Ok(model)
 }
 
-/// Kinks and jumps of the mean curvature across the shared curves.
-fn kinks(result: &Design) -> Vec<report::Histogram> {
-    let joins = &result.check.joins;
-    if joins.is_empty() {
-        return Vec::new();
-    }
-    let histogram =
-        |id: &str, title: &str, quantity: &str, unit: &str, values: Vec<f64>| report::Histogram {
-            id: id.into(),
-            title: title.into(),
-            quantity: quantity.into(),
-            unit: unit.into(),
-            series: vec![report::Series { name: "shared curves".into(), values }],
-            tolerance: None,
-        };
-    let kinks = joins.iter().map(|j| j.kink.to_degrees()).collect();
-    let jumps = joins.iter().map(|j| j.mean_jump).collect();
-    vec![
-        histogram("kinks", "Kinks across shared curves", "angle of the normals", "\u{b0}", kinks),
-        histogram("mean-jumps", "Jumps of the mean curvature", "jump of H", "", jumps),
-    ]
-}
-
 /// Refuses sizes and moduli that no strip can have.
 fn check_sizes(options: &Options) -> Result<(), Failure> {
     let sizes = [
@@ -276,119 +340,6 @@ fn check_sizes(options: &Options) -> Result<(), Failure> {
         }
     }
     Ok(())
-}
-
-/// Drawings and tables of the strips.
-fn lamella_files(
-    folder: &Path,
-    result: &Design,
-    options: &Options,
-    unit: &LengthUnit,
-) -> Vec<(PathBuf, Vec<u8>)> {
-    let boundary = &result.shell.boundary;
-    let mut settings = LamellaOptions { width: 1.0, thickness: 0.05, moduli: None };
-    settings.width = options.lamella_width.unwrap_or_else(|| {
-        let strips = lamellas(&result.net, boundary, &settings);
-        strips.iter().map(|l| l.length).fold(0.0, f64::max) / 20.0
-    });
-    settings.thickness = options.lamella_thickness.unwrap_or(settings.width / 20.0);
-    settings.moduli = options.youngs_modulus.zip(options.shear_modulus).map(|(e, g)| [e, g]);
-    let strips = lamellas(&result.net, boundary, &settings);
-    let drawing = strip_drawing(&strips, &settings);
-    vec![
-        (folder.join("lamellas.svg"), exchange::write_svg(&drawing, unit).into_bytes()),
-        (folder.join("lamellas.dxf"), exchange::write_dxf(&drawing, unit).into_bytes()),
-        (folder.join("lamellas.csv"), lamella_table(&strips).into_bytes()),
-        (folder.join("nodes.csv"), node_table(&strips).into_bytes()),
-    ]
-}
-
-fn strip_drawing(strips: &[Lamella], settings: &LamellaOptions) -> Drawing {
-    let mut drawing = Drawing::default();
-    let height = 0.2 * settings.width;
-    for layout in strip_layout(strips, settings, 0.5 * settings.width) {
-        let corner = layout.outline[0];
-        drawing.lines.push(DrawnLine { layer: "cut".into(), points: layout.outline, closed: true });
-        for mark in layout.marks {
-            let points = mark.to_vec();
-            drawing.lines.push(DrawnLine { layer: "engrave".into(), points, closed: false });
-        }
-        let mut label = |at, text| {
-            let layer = "label".into();
-            drawing.labels.push(Label { layer, at, height, angle: 0.0, text });
-        };
-        let left = geom_core::DVec3::new(-settings.width, 0.0, 0.0);
-        label(corner + left, format!("L{}", layout.lamella));
-        for (at, vertex) in layout.labels {
-            label(at, format!("{vertex}"));
-        }
-    }
-    drawing
-}
-
-fn lamella_table(strips: &[Lamella]) -> String {
-    let header = [
-        "lamella",
-        "family",
-        "curves",
-        "length",
-        "curvature_max",
-        "radius_min",
-        "torsion_max",
-        "twist_deg",
-        "width_bound",
-        "bending_stress",
-        "shear_stress",
-        "edge_stress",
-        "elastic_energy",
-    ];
-    let optional = |value: Option<f64>| value.map_or_else(String::new, |v| v.to_string());
-    let rows = strips.iter().enumerate().map(|(k, l)| {
-        let curves: Vec<String> = l.curves.iter().map(|(i, _)| i.to_string()).collect();
-        vec![
-            format!("L{k}"),
-            if l.family > 0.0 { "u".into() } else { "v".into() },
-            curves.join(" "),
-            l.length.to_string(),
-            l.curvature.to_string(),
-            l.curvature.recip().to_string(),
-            l.torsion.to_string(),
-            l.twist.to_degrees().to_string(),
-            l.width_bound.to_string(),
-            optional(l.bending_stress),
-            optional(l.shear_stress),
-            optional(l.edge_stress),
-            optional(l.elastic_energy),
-        ]
-    });
-    exchange::write_csv(&header, rows)
-}
-
-fn node_table(strips: &[Lamella]) -> String {
-    let header = [
-        "lamella",
-        "vertex",
-        "arc",
-        "angle_deg",
-        "slot_width",
-        "slot_depth",
-        "normal_x",
-        "normal_y",
-        "normal_z",
-        "direction_x",
-        "direction_y",
-        "direction_z",
-    ];
-    let rows = strips.iter().enumerate().flat_map(|(k, l)| {
-        l.nodes.iter().map(move |n| {
-            let mut row = vec![format!("L{k}"), n.vertex.to_string()];
-            let numbers = [n.arc, n.angle.to_degrees(), n.slot_width, n.slot_depth];
-            let frame = n.normal.to_array().into_iter().chain(n.direction.to_array());
-            row.extend(numbers.into_iter().chain(frame).map(|v| v.to_string()));
-            row
-        })
-    });
-    exchange::write_csv(&header, rows)
 }
 
 fn curves_mesh(result: &Design) -> Mesh {
@@ -421,6 +372,14 @@ fn summary(result: &Design, unit: &LengthUnit) -> Vec<String> {
     ];
     if !result.check.joins.is_empty() {
         lines.push(format!("largest kink across a shared curve: {:.1e} degrees", m.kink_max_deg));
+        let before = match result.mean_jump_before {
+            Some(before) => format!(" (with G1 joins {before:.3e})"),
+            None => String::new(),
+        };
+        lines.push(format!(
+            "largest jump of the mean curvature: {:.3e} per {unit}{before}",
+            m.mean_jump_max
+        ));
     }
     if let Some(relaxed) = &result.relaxed {
         lines.push(format!(
