@@ -112,6 +112,11 @@ pub enum AsymptoticError {
         "{place}: the patch folds along {curve} (transversality {worst:.3} of the corner values at t = {t:.3}) and the bounds cannot be met at bi-{degree}; raise the degree or mend the corner data"
     )]
     Folded { place: Place, curve: Place, worst: f64, t: f64, degree: usize },
+    /// C1 and G2 joins with fields or inner points that cannot be shared.
+    #[error(
+        "C1 and G2 joins need the tangent module and thin plates; drop the other ansatz or mask, or use G1 joins"
+    )]
+    JoinsNeedModule,
     /// The system of all patches together.
     #[error("the system of all patches cannot be solved ({0}); fill them with G1 joins")]
     Joint(#[source] gp_solver::SolverError),

@@ -12,7 +12,8 @@ use crate::curve::CurveQuality;
 use crate::data::AsymptoticNet;
 use crate::error::{AsymptoticError, AsymptoticWarning, Place};
 use crate::joint::{Joins, fill_joint};
-use crate::patch::{FilledPatch, PatchBoundary, PatchOptions, fill_patch};
+use crate::mask::Interior;
+use crate::patch::{Ansatz, FilledPatch, PatchBoundary, PatchOptions, fill_patch};
 use crate::quad::check_curve;
 use crate::surface::{BasisTable, Patch, PatchJet};
 use crate::verify::PatchCheck;
@@ -126,6 +127,9 @@ pub(crate) fn fill_solved(
         })
         .collect();
     if joins != Joins::G1 {
+        if options.ansatz != Ansatz::Module || options.interior != Interior::ThinPlate {
+            return Err(AsymptoticError::JoinsNeedModule);
+        }
         let (patches, continuous) = fill_joint(net, &boundary, &outlines, options.degree, joins)?;
         warnings.extend(patches.iter().flat_map(|p| p.warnings.iter().cloned()));
         return Ok(Gridshell { boundary, qualities, patches, outlines, continuous, warnings });

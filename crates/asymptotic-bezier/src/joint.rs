@@ -27,8 +27,10 @@ use crate::surface::Patch;
 
 /// Opposite tangents may differ by this much, relative to their length.
 const OPPOSITE_TOL: f64 = 1e-9;
-/// Weight of the jumps of `N · R_vv` against the thin-plate energy.
-const JUMP_WEIGHT: f64 = 1e6;
+/// Weight of the jumps of `N · R_vv` against the thin-plate energy: larger ones cost digits.
+const JUMP_WEIGHT: f64 = 1e2;
+/// Rounds of the method of multipliers, each of which acts like more weight in the directions that need it.
+const JUMP_ROUNDS: usize = 20;
 /// Samples of the jump along a curve: more than the coefficients of its polynomial.
 const JUMP_SAMPLES: usize = 21;
 
@@ -334,7 +336,7 @@ impl<'a> Joint<'a> {
                         gradient: family.gradient.clone(),
                     })
                     .collect();
-                let y = minimize(freedoms.count, &elements)?;
+                let y = minimize(freedoms.count, &elements, &[])?;
                 let patches = self
                     .families
                     .iter()
@@ -393,7 +395,7 @@ impl<'a> Joint<'a> {
                 list.iter().copied().chain(own).collect()
             })
             .collect();
-        let mut elements: Vec<Element> = self
+        let elements: Vec<Element> = self
             .families
             .par_iter()
             .zip(&lists)
@@ -410,8 +412,7 @@ impl<'a> Joint<'a> {
             .filter(|c| self.shared[*c])
             .map(|c| self.jump(c, &sides[c], &lists))
             .collect();
-        elements.extend(jumps);
-        let y = minimize(first + self.families.len() * inner, &elements)?;
+        let y = minimize(first + self.families.len() * inner, &elements, &jumps)?;
         let patches = self
             .families
             .par_iter()
@@ -584,8 +585,14 @@ struct Element {
     gradient: Vec<f64>,
 }
 
-/// The minimum of the sum of the elements; unknowns without energy stay zero.
-fn minimize(n: usize, elements: &[Element]) -> Result<Vec<f64>, SolverError> {
+/// The minimum of the sum of the elements, where squares as small as can be are wanted of
+/// `constraints`; unknowns without energy stay zero.
+fn minimize(
+    n: usize,
+    elements: &[Element],
+    constraints: &[Element],
+) -> Result<Vec<f64>, SolverError> {
+    let all = || elements.iter().chain(constraints);
     let pairs = |e: &Element| {
         let u = e.unknowns.clone();
         (0..u.len()).flat_map(move |a| {
@@ -594,10 +601,10 @@ fn minimize(n: usize, elements: &[Element]) -> Result<Vec<f64>, SolverError> {
         })
     };
     let diagonal = (0..n).map(|i| (i, i));
-    let pattern = SymmetricPattern::new(n, elements.iter().flat_map(pairs).chain(diagonal))?;
+    let pattern = SymmetricPattern::new(n, all().flat_map(pairs).chain(diagonal))?;
     let mut values = vec![0.0; pattern.len()];
     let mut x = vec![0.0; n];
-    for e in elements {
+    for e in all() {
         for (a, i) in e.unknowns.iter().enumerate() {
             x[*i] -= e.gradient[a];
             for (b, j) in e.unknowns[..=a].iter().enumerate() {
@@ -606,7 +613,7 @@ fn minimize(n: usize, elements: &[Element]) -> Result<Vec<f64>, SolverError> {
             }
         }
     }
-    let right = x.clone();
+    let mut right = x.clone();
     let mut shifted = values.clone();
     for i in 0..n {
         let slot = pattern.slot(i, i).expect("the pattern has the diagonal");
@@ -620,11 +627,24 @@ fn minimize(n: usize, elements: &[Element]) -> Result<Vec<f64>, SolverError> {
     factor.factor(&shifted)?;
     factor.solve_in_place(&mut x);
     let mut image = vec![0.0; n];
-    for _ in 0..2 {
-        factor.pattern().multiply(&values, &x, &mut image);
-        let mut step: Vec<f64> = right.iter().zip(&image).map(|(r, y)| r - y).collect();
-        factor.solve_in_place(&mut step);
-        axpy(1.0, &step, &mut x);
+    let rounds = if constraints.is_empty() { 1 } else { JUMP_ROUNDS };
+    for round in 0..rounds {
+        if round > 0 {
+            // Multipliers: the forces of the constraints stay on, whatever is left of them.
+            for e in constraints {
+                let own: Vec<f64> = e.unknowns.iter().map(|i| x[*i]).collect();
+                for (a, force) in e.hessian.apply(&own).into_iter().enumerate() {
+                    right[e.unknowns[a]] -= force + e.gradient[a];
+                }
+            }
+        }
+        // The last round is refined once more.
+        for _ in 0..1 + usize::from(round + 1 == rounds) {
+            factor.pattern().multiply(&values, &x, &mut image);
+            let mut step: Vec<f64> = right.iter().zip(&image).map(|(r, y)| r - y).collect();
+            factor.solve_in_place(&mut step);
+            axpy(1.0, &step, &mut x);
+        }
     }
     Ok(x)
 }

@@ -67,3 +67,31 @@ fn swapped_roles_and_reversed_parameters_give_the_same_surface() {
         assert!(error < 1e-10, "{name} reversed: {error:e}");
     }
 }
+
+/// A net moved rigidly and scaled, with joins of all kinds.
+#[test]
+fn joined_patches_follow_motions_and_scales() {
+    use asymptotic_bezier::{AsymptoticNet, GridshellOptions, Joins, NetCurve, fill_net};
+    let net = common::exact_net(common::catenoid, [0.2, 1.4, -0.1, 0.9], [2, 2]);
+    let turn = DMat3::from_rotation_x(0.4) * DMat3::from_rotation_z(1.1);
+    let (shift, scale) = (DVec3::new(0.3, -1.2, 0.7), 37.0);
+    let map = |p: DVec3| (turn * p + shift) * scale;
+    let curves = net.curves().iter().map(|c| NetCurve {
+        arms: c.arms.map(|a| turn * a * scale),
+        curvatures: c.curvatures.map(|k| k / scale),
+        ..*c
+    });
+    let quads: Vec<[usize; 4]> =
+        net.faces().iter().map(|f| [0, 1, 3, 2].map(|c| net.face_corner(f, c))).collect();
+    let positions = net.positions().iter().map(|p| map(*p)).collect();
+    let moved = AsymptoticNet::new(positions, &quads, curves.collect()).unwrap();
+    for joins in [Joins::G1, Joins::C1, Joins::G2] {
+        let options = GridshellOptions { joins, ..Default::default() };
+        let (here, there) =
+            (fill_net(&net, &options).unwrap(), fill_net(&moved, &options).unwrap());
+        for (a, b) in here.patches.iter().zip(&there.patches) {
+            let error = largest(&b.patch, |i, j| map(a.patch.point(i, j))) / scale;
+            assert!(error < 1e-10, "{joins:?}: {error:e}");
+        }
+    }
+}

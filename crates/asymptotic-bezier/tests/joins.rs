@@ -4,7 +4,7 @@
 mod common;
 
 use asymptotic_bezier::{
-    AsymptoticNet, GridshellCheck, GridshellOptions, Joins, PatchOptions, fill_net,
+    AsymptoticNet, GridshellCheck, GridshellOptions, Interior, Joins, PatchOptions, fill_net,
 };
 use common::star::star;
 use common::{catenoid, enneper, exact_net};
@@ -71,6 +71,13 @@ fn joins_at_irregular_vertices_stay_g1() {
         joins: Joins::C1,
         ..Default::default()
     };
+    let masked = GridshellOptions {
+        patch: PatchOptions { interior: Interior::Bending, ..Default::default() },
+        joins: Joins::G2,
+        ..Default::default()
+    };
+    let error = fill_net(&net, &masked).unwrap_err().to_string();
+    assert!(error.starts_with("C1 and G2 joins need the tangent module and thin plates"));
     let error = fill_net(&net, &options).unwrap_err().to_string();
     assert_eq!(error, "degree 5 of the jointly filled surface is outside 6..=15");
 }

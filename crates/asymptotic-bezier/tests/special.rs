@@ -4,12 +4,14 @@
 mod common;
 
 use asymptotic_bezier::{
-    BoundaryEnergy, BoundaryOptions, CornerData, Curvatures, GridshellOptions, Interior,
-    PatchCheck, PatchOptions, Place, Quadrilateral, TorsionHandle, fill_net, fill_patch,
-    solve_quadrilateral, solve_quartic_quadrilateral,
+    AsymptoticNet, BoundaryEnergy, BoundaryOptions, CornerData, Curvatures, GridshellOptions,
+    Input, Interior, PatchCheck, PatchOptions, Place, Quadrilateral, TorsionHandle, TorsionWish,
+    fill_net, fill_patch, solve_boundary, solve_quadrilateral, solve_quartic_quadrilateral,
+    torsion_handles,
 };
 use common::star::star;
-use common::{catenoid, corner_data, enneper, reference_set, wave};
+use common::{catenoid, corner_data, enneper, exact_net, reference_set, wave};
+use geom_core::DVec3;
 
 fn filled(quad: &Quadrilateral) -> (f64, PatchCheck) {
     let filled = fill_patch(&quad.boundary, &PatchOptions::default(), Place::Patch(0)).unwrap();
@@ -129,6 +131,63 @@ fn torsion_handles_are_met_exactly() {
     assert!((tau + 1.0).abs() < 1e-10, "{tau}");
     let (_, check) = filled(&quad);
     assert!(check.torsion_defect < 1e-8);
+}
+
+/// `CORNER=K` of the command line: the sign is that of the twist of the corners.
+#[test]
+fn gaussian_curvatures_are_wished_for_without_a_sign() {
+    use std::collections::BTreeMap;
+    for mirrored in [false, true] {
+        let flip = if mirrored { -1.0 } else { 1.0 };
+        let data = reference_set("B").data;
+        let input = Input::Patch(Box::new(data.map_points(|p| DVec3::new(p.x, p.y, flip * p.z))));
+        let wishes = BTreeMap::from([
+            ("11".to_owned(), TorsionWish::GaussianBetween(-0.25, -0.16, 0.0)),
+            ("00".to_owned(), TorsionWish::Gaussian(-1.0, 0.0)),
+        ]);
+        let torsions = torsion_handles(&input, &wishes).unwrap();
+        let options = BoundaryOptions { torsions, ..Default::default() };
+        let Input::Patch(data) = &input else { unreachable!() };
+        let quad = solve_quadrilateral(data, &options).unwrap();
+        assert!((quad.torsions[0] - flip).abs() < 1e-12, "{:?}", quad.torsions);
+        assert!((quad.torsions[3] - 0.4 * flip).abs() < 1e-12, "{:?}", quad.torsions);
+        let refused = |name: &str, wish| {
+            let wishes = BTreeMap::from([(name.to_owned(), wish)]);
+            torsion_handles(&input, &wishes).unwrap_err().to_string()
+        };
+        let error = refused("12", TorsionWish::Fixed(1.0));
+        assert_eq!(error, "`torsions` has \"12\"; use 00, 10, 01 or 11");
+        let error = refused("10", TorsionWish::Gaussian(0.5, 1.0));
+        assert!(error.contains("the Gaussian curvature 0.5 is above zero"), "{error}");
+    }
+}
+
+/// The curves of a solved net, sampled as an OBJ file has them, give the net back.
+#[test]
+fn sampled_curves_give_their_net_back() {
+    let net = exact_net(enneper, [-0.6, 0.9, 0.2, 1.3], [2, 2]);
+    let boundary = solve_boundary(&net, &BoundaryOptions::default()).unwrap();
+    let polylines: Vec<Vec<DVec3>> = boundary.curves.iter().map(|c| c.polyline(64)).collect();
+    let again = AsymptoticNet::from_polylines(&polylines).unwrap();
+    assert_eq!((again.faces().len(), again.curves().len()), (4, 12));
+    for (a, b) in net.curves().iter().zip(again.curves()) {
+        for e in 0..2 {
+            let turn = a.arms[e].normalize().cross(b.arms[e].normalize()).length();
+            assert!(turn < 1e-4, "tangents differ by {turn}");
+            // The faces may have turned over, and with them what is left.
+            let (k, l) = (a.curvatures[e].abs(), b.curvatures[e].abs());
+            assert!((k - l).abs() < 0.02 * k, "{k} {l}");
+        }
+    }
+    let options = GridshellOptions::default();
+    let shell = fill_net(&again, &options).unwrap();
+    let check = shell.verify(&again, &options.patch);
+    assert!(check.kink().to_degrees() < 1e-8);
+    assert!(check.patches.iter().all(|p| p.sine > 0.5 && p.normal_curvature < 1e-10));
+    let error = AsymptoticNet::from_polylines(&polylines[1..]).unwrap_err().to_string();
+    assert!(error.contains("lies on 0 rings of four"), "{error}");
+    let error = AsymptoticNet::from_polylines(&[polylines[0][..2].to_vec()]).unwrap_err();
+    assert_eq!(error.to_string(), "net: polyline 0 has 2 points; three are needed for a curvature");
 }
 
 #[test]

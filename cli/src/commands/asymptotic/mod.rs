@@ -234,11 +234,11 @@ fn read_input(
     }
     if exchange::extension_of(path) == "obj" {
         let model = exchange::read_model(path).map_err(|e| refused(&e))?;
-        if model.meshes.iter().any(|m| !m.faces.is_empty()) {
-            return Err(refused(&"faces in a file of curves; with --from-net it is a quad mesh"));
-        }
         let lines = model.meshes.iter().flat_map(|m| (0..m.lines.len()).map(|k| m.polyline(k)));
         let polylines: Vec<Vec<geom_core::DVec3>> = lines.map(Iterator::collect).collect();
+        if polylines.is_empty() {
+            return Err(refused(&"no polylines in this file; a quad mesh needs --from-net"));
+        }
         let net = AsymptoticNet::from_polylines(&polylines).map_err(|e| refused(&e))?;
         let input = Input::Net(net);
         let handles = handles(&input)?;
