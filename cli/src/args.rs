@@ -142,6 +142,32 @@ impl<'de> Deserialize<'de> for Counts {
     }
 }
 
+/// Width and height of a sheet in model units, written `3x1.5`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct SheetSize(pub(crate) [f64; 2]);
+
+impl FromStr for SheetSize {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let size = text.split_once(['x', 'X']).and_then(|(width, height)| {
+            Some([width.trim().parse::<f64>().ok()?, height.trim().parse().ok()?])
+        });
+        match size {
+            Some(size) if size.iter().all(|s| *s > 0.0 && s.is_finite()) => Ok(Self(size)),
+            _ => Err(format!(
+                "`{text}` is not of the form WxH with two positive lengths, as in 3x1.5"
+            )),
+        }
+    }
+}
+
+impl<'de> Deserialize<'de> for SheetSize {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        String::deserialize(deserializer)?.parse().map_err(serde::de::Error::custom)
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -151,6 +177,14 @@ mod tests {
         assert_eq!("25x18".parse(), Ok(Counts { u: 25, v: 18 }));
         for bad in ["25", "25x", "0x4", "-1x3", "4x4x4", "axb", ""] {
             assert!(bad.parse::<Counts>().is_err(), "{bad}");
+        }
+    }
+
+    #[test]
+    fn sheets_have_two_positive_sides() {
+        assert_eq!("3x1.5".parse(), Ok(SheetSize([3.0, 1.5])));
+        for bad in ["3", "3x", "0x4", "-1x3", "3x4x5", "infx2", "NaNx1", ""] {
+            assert!(bad.parse::<SheetSize>().is_err(), "{bad}");
         }
     }
 }

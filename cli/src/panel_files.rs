@@ -1,8 +1,9 @@
 //! Files and numbers of a paneling.
 
 use crate::failure::Failure;
-use exchange::{Group, LengthUnit, Mesh, Model, NamedSurface};
-use paneling::{Mold, PanelRow, PanelSet, Paneling};
+use exchange::{Drawing, DrawnLine, Group, Label, LengthUnit, Mesh, Model, NamedSurface};
+use geom_core::DVec3;
+use paneling::{FlatPanel, FlatSheets, Mold, PanelRow, PanelSet, Paneling};
 use serde::Serialize;
 use std::path::Path;
 
@@ -52,18 +53,23 @@ struct PanelingFile<'a> {
     panels: &'a [PanelRow],
 }
 
-/// The bytes of `path`: panels, their table, or molds, by its extension.
+/// File extensions a paneling can be written as.
+pub(crate) const PANEL_OUTPUTS: [&str; 8] =
+    ["glb", "obj", "csv", "ron", "step", "stp", "svg", "dxf"];
+
+/// The bytes of `path`: panels, their table, molds, or flat outlines, by its extension. `sheet` is
+/// width and height of the sheets for flat outlines.
 pub(crate) fn encode(
     path: &Path,
     set: &PanelSet,
     paneling: &Paneling,
-    table: &[PanelRow],
     unit: &LengthUnit,
+    sheet: Option<[f64; 2]>,
 ) -> Result<Vec<u8>, Failure> {
     match exchange::extension_of(path).as_str() {
-        "csv" => Ok(csv(table).into_bytes()),
+        "csv" => Ok(csv(&paneling.table(set)).into_bytes()),
         "ron" => {
-            let file = PanelingFile { molds: &paneling.molds, panels: table };
+            let file = PanelingFile { molds: &paneling.molds, panels: &paneling.table(set) };
             exchange::to_ron(&file).map(String::into_bytes).map_err(Failure::other)
         }
         "step" | "stp" => {
@@ -75,11 +81,64 @@ pub(crate) fn encode(
             }
             exchange::encode_model(path, &model).map_err(|e| Failure::input(path, e))
         }
+        kind @ ("svg" | "dxf") => {
+            let flat = paneling.flat_panels(set, sheet).map_err(Failure::usage)?;
+            if flat.panels.is_empty() {
+                return Err(Failure::input(
+                    path,
+                    "no panel can be unrolled; flat outlines need planar or cylindrical molds, as in --mold-types cylinder",
+                ));
+            }
+            let drawing = drawing(&flat, sheet.is_some(), unit);
+            let write = if kind == "svg" { exchange::write_svg } else { exchange::write_dxf };
+            Ok(write(&drawing, unit).into_bytes())
+        }
         _ => {
             let model = Model::of_mesh(panels_mesh(set, paneling), unit.clone());
             exchange::encode_model(path, &model).map_err(|e| Failure::input(path, e))
         }
     }
+}
+
+/// Outlines to cut, marks along the bending axes, names, and the borders of the sheets.
+fn drawing(flat: &FlatSheets, with_sheets: bool, unit: &LengthUnit) -> Drawing {
+    let at = |p: &geom_core::DVec2| DVec3::new(p.x, p.y, 0.0);
+    let mut drawing = Drawing::default();
+    let mut line = |layer: &str, points: Vec<DVec3>, closed| {
+        drawing.lines.push(DrawnLine { layer: layer.to_owned(), points, closed });
+    };
+    if with_sheets {
+        for [low, high] in &flat.sheets {
+            let corners = [[low.x, low.y], [high.x, low.y], [high.x, high.y], [low.x, high.y]];
+            line("sheet", corners.map(|[x, y]| DVec3::new(x, y, 0.0)).to_vec(), true);
+        }
+    }
+    for panel in &flat.panels {
+        line("cut", panel.outline.iter().map(at).collect(), true);
+        if let Some(bend) = panel.bend {
+            line("bend", bend.mark.iter().map(at).collect(), false);
+        }
+    }
+    let texts = flat.panels.iter().flat_map(|panel| names(panel, unit));
+    drawing.labels.extend(texts);
+    drawing
+}
+
+/// Panel and mold, and below them the bending radius, to the right of the mark.
+fn names(panel: &FlatPanel, unit: &LengthUnit) -> Vec<Label> {
+    let mut lines = vec![format!("P{} M{}", panel.panel, panel.mold)];
+    if let Some(bend) = panel.bend {
+        lines.push(format!("R {:.4} {unit}", bend.radius));
+    }
+    // Letters are about as wide as high; a line takes less than half of the breadth.
+    let longest = lines.iter().map(String::len).max().unwrap_or(1);
+    let height = 0.42 * panel.breadth / longest as f64;
+    let label = |(k, text): (usize, String)| {
+        let below = 1.6 * height * k as f64;
+        let at = DVec3::new(panel.middle.x + 0.6 * height, panel.middle.y - below, 0.0);
+        Label { layer: "label".to_owned(), at, height, angle: 0.0, text }
+    };
+    lines.into_iter().enumerate().map(label).collect()
 }
 
 fn mold_name(m: usize, mold: &Mold) -> String {

@@ -170,7 +170,7 @@ impl Panelings {
 
     fn encode(&self, path: &Path, unit: &LengthUnit) -> Result<Vec<u8>, Failure> {
         let (set, paneling) = &self.after;
-        encode(path, set, paneling, &paneling.table(set), unit)
+        encode(path, set, paneling, unit, None)
     }
 }
 

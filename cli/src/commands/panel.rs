@@ -1,11 +1,11 @@
 //! `umbilic panel SURFACE -o OUT`.
 
-use crate::args::{ConfigArgs, ConvergedArgs, Counts, ReportArgs, check_output_path};
+use crate::args::{ConfigArgs, ConvergedArgs, Counts, ReportArgs, SheetSize, check_output_path};
 use crate::context::Context;
 use crate::failure::Failure;
 use crate::layered;
 use crate::outcome::{Outcome, Status};
-use crate::panel_files::{Quality, encode};
+use crate::panel_files::{PANEL_OUTPUTS, Quality, encode};
 use crate::report_support;
 use crate::report_support::panels::paneling_report;
 use bspline::BsplineSurface;
@@ -26,7 +26,8 @@ use std::path::{Path, PathBuf};
 pub(crate) struct Panel {
     /// File with one B-spline surface
     surface: PathBuf,
-    /// Where to write (repeatable): panels as glb or obj, their table as csv or ron, molds as step
+    /// Where to write (repeatable): panels as glb or obj, their table as csv or ron, molds as step,
+    /// flat outlines of panels on planar and cylindrical molds as svg or dxf
     #[arg(short, long = "output", value_name = "FILE", required = true)]
     output: Vec<PathBuf>,
     #[command(flatten)]
@@ -78,6 +79,9 @@ pub(crate) struct PanelOptions {
     /// Most steps of the joint seam step (default 8); 0 leaves it out
     #[arg(long, value_name = "N")]
     seam_steps: Option<usize>,
+    /// Width and height of the sheets for flat outlines, in model units (default: one large sheet)
+    #[arg(long, value_name = "WxH")]
+    sheet: Option<SheetSize>,
 }
 
 layered!(PanelOptions {
@@ -92,6 +96,7 @@ layered!(PanelOptions {
     mold_types,
     prices,
     seam_steps,
+    sheet,
 });
 
 /// How the number of molds is chosen.
@@ -204,7 +209,6 @@ impl Panel {
         };
         let result = solve(&set, &options, &rule, &prices)?;
         let paneling = &result.bounded.paneling;
-        let table = paneling.table(&set);
         let mut outcome = Outcome::new(result.status, result.iterations)
             .with_input(&self.surface)
             .with_metrics(&PanelMetrics {
@@ -216,7 +220,11 @@ impl Panel {
         outcome.require_converged = self.converged.require_converged;
         outcome.summary = summary(&set, &result, &unit);
         for path in self.output {
-            let bytes = encode(&path, &set, paneling, &table, &unit)?;
+            let sheet = options.sheet.map(|s| s.0);
+            let bytes = encode(&path, &set, paneling, &unit, sheet)?;
+            if ["svg", "dxf"].contains(&exchange::extension_of(&path).as_str()) {
+                outcome.warnings.extend(not_unrolled(paneling, &path));
+            }
             outcome.files.push((path, bytes));
         }
         if self.report.wanted() {
@@ -235,16 +243,29 @@ impl Panel {
                 return Err(Failure::usage(message));
             }
             let extension = exchange::extension_of(path);
-            if !["csv", "ron", "step", "stp", "glb", "obj"].contains(&extension.as_str()) {
+            if !PANEL_OUTPUTS.contains(&extension.as_str()) {
                 return Err(Failure::input(
                     path,
-                    "panels are written as glb or obj, their table as csv or ron, molds as step",
+                    "panels are written as glb or obj, their table as csv or ron, molds as step, flat outlines as svg or dxf",
                 ));
             }
             check_output_path(path)?;
         }
         Ok(())
     }
+}
+
+/// What to say if some panels are not in a drawing of flat outlines.
+fn not_unrolled(paneling: &Paneling, path: &Path) -> Option<String> {
+    let is_curved = |m: &&usize| !paneling.molds[**m].kind.is_developable();
+    let missing = paneling.labels.iter().filter(is_curved).count();
+    (missing > 0).then(|| {
+        format!(
+            "{}: {missing} of {} panels are on molds that cannot be unrolled and are not drawn",
+            path.display(),
+            paneling.labels.len()
+        )
+    })
 }
 
 fn read_surface(path: &Path) -> Result<(BsplineSurface, LengthUnit), Failure> {
@@ -285,12 +306,15 @@ fn solve(
         Some(path) => Failure::input(path, e),
         None => Failure::usage(e),
     })?;
-    let (bounded, worst_excess) = match rule {
+    let (bounded, worst_excess, grid) = match rule {
         MoldRule::Bounds(bounds) => {
             let found =
                 panel_within(set, bounds, &types, prices, &settings).map_err(Failure::usage)?;
             let worst = found.worst_excess;
-            (found, Some(worst))
+            settings.molds = found.paneling.molds.len();
+            settings.mold_type = types.iter().copied().max().unwrap_or(MoldType::Cubic);
+            let grid = grid_options(&settings).map(|o| panel(set, &o)).transpose();
+            (found, Some(worst), grid.map_err(Failure::usage)?)
         }
         _ => {
             let [kind] = types[..] else {
@@ -299,25 +323,21 @@ fn solve(
                 ));
             };
             settings.mold_type = kind;
-            let paneling = panel(set, &settings).map_err(Failure::usage)?;
+            let (paneling, grid) = rayon::join(
+                || panel(set, &settings),
+                || grid_options(&settings).map(|o| panel(set, &o)).transpose(),
+            );
+            let (paneling, grid) =
+                (paneling.map_err(Failure::usage)?, grid.map_err(Failure::usage)?);
             let cost = paneling.cost(prices);
             let bounded =
                 Bounded { paneling, is_within: true, worst_excess: 0.0, cost, attempts: 1 };
-            (bounded, None)
+            (bounded, None, grid)
         }
     };
     let grid = match settings.clustering {
-        Clustering::Own => {
-            let grid = Options {
-                clustering: Clustering::Grid(DiagramAxis::SignedRoot),
-                molds: bounded.paneling.molds.len(),
-                mold_type: types.iter().copied().max().unwrap_or(MoldType::Cubic),
-                ..settings
-            };
-            Some(panel(set, &grid).map_err(Failure::usage)?)
-        }
         Clustering::Grid(_) => Some(bounded.paneling.clone()),
-        Clustering::Cover => None,
+        Clustering::Own | Clustering::Cover => grid,
     };
     let status = match rule {
         MoldRule::Bounds(_) if bounded.is_within => Status::Converged,
@@ -328,6 +348,12 @@ fn solve(
     let iterations =
         bounded.paneling.fit_history.len() + bounded.paneling.seam_history.len().saturating_sub(1);
     Ok(Solved { bounded, status, iterations, worst_excess, grid })
+}
+
+/// The published grid to compare with, if it was not chosen anyway.
+fn grid_options(settings: &Options) -> Option<Options> {
+    let clustering = Clustering::Grid(DiagramAxis::SignedRoot);
+    (settings.clustering == Clustering::Own).then(|| Options { clustering, ..settings.clone() })
 }
 
 /// The `metrics` object.

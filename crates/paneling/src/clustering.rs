@@ -79,31 +79,33 @@ pub(crate) type Feature = [f64; MAX_PARAMETERS];
 
 const EVEN: usize = 3;
 
+/// The cubic nearest to a panel in its principal frame, and the Gram matrix of the fit (lower
+/// triangle).
+pub(crate) fn best_cubic(set: &PanelSet, p: usize, slope_weight: f64) -> (Feature, [Feature; 7]) {
+    let flat = Mold::flat(MoldType::Cubic);
+    let (points, normals) = set.panel_samples(p);
+    let to_local = set.frames[p].rotation.transpose();
+    let (mut a, mut b) = ([[0.0; 7]; 7], [0.0; 7]);
+    for (x, n) in points.iter().zip(normals) {
+        let local = to_local * (*x - set.frames[p].origin);
+        let r = sample_residual(&flat, slope_weight, local, to_local * *n);
+        for (row, r) in sample_mold_rows(&flat, slope_weight, local).iter().zip(r) {
+            accumulate(&mut a, &mut b, row, -r);
+        }
+    }
+    let gram = a;
+    // Panels with few samples across may not determine all seven.
+    for (i, row) in a.iter_mut().enumerate() {
+        row[i] *= 1.0 + 1e-9;
+    }
+    solve_spd(&mut a, &mut b);
+    (b, gram)
+}
+
 /// The shapes of all panels (lengths in units of the panel size).
 pub(crate) fn features(set: &PanelSet, slope_weight: f64) -> Vec<Feature> {
-    let flat = Mold::flat(MoldType::Cubic);
-    let fitted: Vec<(Feature, [[f64; 7]; 7])> = (0..set.len())
-        .into_par_iter()
-        .map(|p| {
-            let (points, normals) = set.panel_samples(p);
-            let to_local = set.frames[p].rotation.transpose();
-            let (mut a, mut b) = ([[0.0; 7]; 7], [0.0; 7]);
-            for (x, n) in points.iter().zip(normals) {
-                let local = to_local * (*x - set.frames[p].origin);
-                let r = sample_residual(&flat, slope_weight, local, to_local * *n);
-                for (row, r) in sample_mold_rows(&flat, slope_weight, local).iter().zip(r) {
-                    accumulate(&mut a, &mut b, row, -r);
-                }
-            }
-            let gram = a;
-            // Panels with few samples across may not determine all seven.
-            for (i, row) in a.iter_mut().enumerate() {
-                row[i] *= 1.0 + 1e-9;
-            }
-            solve_spd(&mut a, &mut b);
-            (b, gram)
-        })
-        .collect();
+    let fitted: Vec<(Feature, [Feature; 7])> =
+        (0..set.len()).into_par_iter().map(|p| best_cubic(set, p, slope_weight)).collect();
     // The metric: the mean Gram matrix, without the odd cross terms that a centred panel lacks.
     let mut metric = [[0.0; 7]; 7];
     for (_, gram) in &fitted {

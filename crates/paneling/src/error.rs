@@ -53,6 +53,12 @@ pub enum PanelingError {
     /// A bound that no paneling can be measured against.
     #[error("{name} is {value}; it must be positive and finite")]
     BadOption { name: &'static str, value: f64 },
+    /// A flat panel that does not fit on a sheet.
+    #[error(
+        "panel {panel} needs {} x {} of sheet with its margins, but a sheet is {} x {}; take a larger sheet or smaller panels",
+        size[0], size[1], sheet[0], sheet[1]
+    )]
+    SheetTooSmall { panel: usize, size: [f64; 2], sheet: [f64; 2] },
     /// No type of mold was allowed.
     #[error(
         "no mold type is allowed; name at least one of plane, cylinder, sphere, paraboloid, torus, cubic"

@@ -2,11 +2,13 @@
 
 use crate::clustering::Clusters;
 use crate::mold::{MAX_PARAMETERS, Mold, MoldType};
+use crate::mold_step::{self, FIRST_DAMPING};
 use crate::panels::{PanelSet, Pose};
 use crate::residuals::{
-    POSE, moved, panel_energy, sample_mold_rows, sample_pose_rows, sample_residual,
+    POSE, moved, panel_energy, reach, sample_mold_rows, sample_pose_rows, sample_residual,
 };
 use crate::small::{accumulate, solve_spd};
+use crate::torus_start::{self, quarter_turn};
 use rayon::prelude::*;
 
 /// Molds with the panels that are made on them; lengths in units of the panel size.
@@ -25,10 +27,14 @@ pub(crate) struct Fit {
 }
 
 /// A round that lowers the energy by less than this share ends the alternation.
-pub(crate) const STALL: f64 = 2e-3;
-/// Mean squared residual of a sample, in panel sizes and radians, at which a fit is exact to
-/// rounding and nothing is left to improve.
-pub(crate) const EXACT: f64 = 1e-28;
+pub(crate) const STALL: f64 = 1e-2;
+/// A mold whose step lowers the energy of its panels by less than this share stays as it is.
+const MOLD_STALL: f64 = 1e-3;
+/// Rounds that alternate, before molds and poses move together.
+const ALTERNATING: usize = 1;
+/// Mean squared residual of a sample, in panel sizes and radians, at which a fit is exact for
+/// every workshop and nothing is left to improve.
+pub(crate) const EXACT: f64 = 1e-22;
 /// Gauss-Newton steps of a registration per round.
 const REGISTRATION_STEPS: usize = 2;
 /// Damping of a registration, a share of the mean diagonal.
@@ -55,7 +61,7 @@ impl Fit {
         let molds = members
             .iter()
             .zip(kinds)
-            .map(|(panels, &kind)| first_mold(set, panels, kind, &mut poses))
+            .map(|(panels, &kind)| first_mold(set, panels, kind, slope_weight, &mut poses))
             .collect();
         let mut fit = Self {
             molds,
@@ -89,23 +95,60 @@ impl Fit {
         )
     }
 
-    /// Alternates between molds and poses for at most `rounds` rounds; the energy never rises.
-    /// Returns the energy after each round.
+    /// Fits molds and poses in at most `rounds` rounds; the energy never rises. The first
+    /// alternates between molds and poses and try both half turns of every panel, the others move
+    /// every mold together with its panels. Returns the energy after each round.
     pub(crate) fn alternate(&mut self, set: &PanelSet, rounds: usize) -> Vec<f64> {
         let mut history = Vec::new();
+        let mut joint = vec![Some(FIRST_DAMPING); self.molds.len()];
         for round in 0..rounds {
-            self.refit_molds(set);
-            self.register(set, round < 2);
+            if round < ALTERNATING {
+                self.refit_molds(set);
+                self.register(set);
+            } else {
+                self.step_jointly(set, &mut joint);
+            }
             let energy = self.energy();
             let stalled =
                 history.last().is_some_and(|&before: &f64| energy > (1.0 - STALL) * before);
             history.push(energy);
+            tracing::debug!(round, energy, "molds and poses");
             let is_exact = energy <= EXACT * set.samples.points.len() as f64;
-            if is_exact || (stalled && round > 2) {
+            if is_exact || (stalled && round > ALTERNATING) {
                 break;
             }
         }
         history
+    }
+
+    /// A step of every mold that still moves, together with its panels. `damping` is `None` where
+    /// the last step changed too little.
+    fn step_jointly(&mut self, set: &PanelSet, damping: &mut [Option<f64>]) {
+        let moved: Vec<_> = damping
+            .par_iter_mut()
+            .enumerate()
+            .map(|(m, damping)| {
+                let step = damping.as_mut().and_then(|d| mold_step::step(set, self, m, d));
+                if step.is_none() {
+                    *damping = None;
+                }
+                step
+            })
+            .collect();
+        for (m, moved) in moved.into_iter().enumerate() {
+            let Some(moved) = moved else { continue };
+            self.molds[m] = moved.mold;
+            let (mut before, mut after) = (0.0, 0.0);
+            for (&p, (pose, energy)) in self.members[m].iter().zip(moved.panels) {
+                before += self.energies[p];
+                after += energy;
+                self.poses[p] = pose;
+                self.energies[p] = energy;
+            }
+            if after > (1.0 - MOLD_STALL) * before {
+                damping[m] = None;
+            }
+        }
     }
 
     /// Gives a mold another type and starts its panels afresh from their principal frames.
@@ -113,7 +156,8 @@ impl Fit {
         for &p in &self.members[m] {
             self.poses[p] = set.frames[p];
         }
-        self.molds[m] = first_mold(set, &self.members[m], kind, &mut self.poses);
+        let panels = &self.members[m];
+        self.molds[m] = first_mold(set, panels, kind, self.slope_weight, &mut self.poses);
     }
 
     /// Splits a mold in two equal ones; `halves` says for each of its panels whether it stays (0)
@@ -177,8 +221,8 @@ impl Fit {
         if energy(&next) <= energy(mold) { next } else { *mold }
     }
 
-    /// Rigid registration of every panel on its mold.
-    fn register(&mut self, set: &PanelSet, try_turned: bool) {
+    /// Rigid registration of every panel on its mold, of the two half turns the better.
+    fn register(&mut self, set: &PanelSet) {
         let registered: Vec<(Pose, f64)> = (0..set.len())
             .into_par_iter()
             .with_min_len(16)
@@ -186,9 +230,6 @@ impl Fit {
                 let mold = &self.molds[self.labels[p]];
                 let here = (self.poses[p], self.energies[p]);
                 let best = self.registered(set, p, mold, here);
-                if !try_turned {
-                    return best;
-                }
                 let turned = self.poses[p].turned();
                 let (points, normals) = set.panel_samples(p);
                 let energy = panel_energy(mold, self.slope_weight, &turned, points, normals);
@@ -221,6 +262,10 @@ impl Fit {
                     accumulate(&mut a, &mut b, row, -r);
                 }
             }
+            if let Some((r, row)) = reach(mold, to_local * (points[points.len() - 1] - pose.origin))
+            {
+                accumulate(&mut a, &mut b, &row, -r);
+            }
             let damping = REGISTRATION_DAMPING * (0..POSE).map(|i| a[i][i]).sum::<f64>() / 6.0;
             for (i, row) in a.iter_mut().enumerate() {
                 row[i] += damping;
@@ -238,9 +283,17 @@ impl Fit {
     }
 }
 
-/// The mold a cluster starts from; turns the frames of its panels where the type needs its axes
-/// in a certain order.
-fn first_mold(set: &PanelSet, panels: &[usize], kind: MoldType, poses: &mut [Pose]) -> Mold {
+/// The mold a cluster starts from; moves the frames of its panels to where the type needs them.
+fn first_mold(
+    set: &PanelSet,
+    panels: &[usize],
+    kind: MoldType,
+    slope_weight: f64,
+    poses: &mut [Pose],
+) -> Mold {
+    if kind == MoldType::Torus {
+        return first_torus(set, panels, slope_weight, poses);
+    }
     let mut mold = Mold::flat(kind);
     let n = panels.len() as f64;
     let mean = |f: &dyn Fn(f64, f64) -> f64| {
@@ -249,29 +302,39 @@ fn first_mold(set: &PanelSet, panels: &[usize], kind: MoldType, poses: &mut [Pos
     let half = |h: f64, k: f64| (h * h - k).max(0.0).sqrt();
     let k1 = mean(&|h, k| h + half(h, k));
     let k2 = mean(&|h, k| h - half(h, k));
-    // Frames have the larger curvature along x. A cylinder wants the one of larger size there,
-    // a torus along y, where its generating circle is.
-    let x_has_larger_size = k1.abs() >= k2.abs();
-    let turn = match kind {
-        MoldType::Cylinder => !x_has_larger_size,
-        MoldType::Torus => x_has_larger_size,
-        _ => false,
-    };
-    let (along_x, along_y) = if turn { (k2, k1) } else { (k1, k2) };
     match kind {
-        MoldType::Cylinder => mold.parameters[0] = along_x,
+        MoldType::Cylinder => {
+            // Frames have the larger curvature along x; the one of larger size is wanted there.
+            let turn = k1.abs() < k2.abs();
+            mold.parameters[0] = if turn { k2 } else { k1 };
+            if turn {
+                for &p in panels {
+                    poses[p].rotation = quarter_turn(poses[p].rotation);
+                }
+            }
+        }
         MoldType::Sphere => mold.parameters[0] = 0.5 * (k1 + k2),
-        MoldType::Torus => {
-            mold.parameters[0] = along_x;
-            mold.parameters[1] = along_y;
-        }
-        MoldType::Plane | MoldType::Paraboloid | MoldType::Cubic => {}
+        MoldType::Plane | MoldType::Paraboloid | MoldType::Torus | MoldType::Cubic => {}
     }
-    if turn {
-        for &p in panels {
-            let r = poses[p].rotation;
-            poses[p].rotation = glam::DMat3::from_cols(r.y_axis, -r.x_axis, r.z_axis);
-        }
+    mold
+}
+
+/// The better of two tori, whose parallels run along the one or the other principal direction.
+fn first_torus(set: &PanelSet, panels: &[usize], slope_weight: f64, poses: &mut [Pose]) -> Mold {
+    let starts = [true, false].map(|is_across| {
+        let (mold, own) = torus_start::start(set, panels, slope_weight, is_across);
+        let energy = |(&p, pose): (&usize, &Pose)| {
+            let (points, normals) = set.panel_samples(p);
+            panel_energy(&mold, slope_weight, pose, points, normals)
+        };
+        let sum: f64 = panels.iter().zip(&own).map(energy).sum();
+        (mold, own, sum)
+    });
+    let [a, b] = starts;
+    // NaN, a panel beyond the reach of the torus, loses.
+    let (mold, own, _) = if b.2 < a.2 || a.2.is_nan() { b } else { a };
+    for (&p, pose) in panels.iter().zip(own) {
+        poses[p] = pose;
     }
     mold
 }

@@ -1,5 +1,6 @@
 //! Mold shapes: height functions over the tangent plane of a mold's own frame.
 
+use crate::taylor::Taylor;
 use serde::{Deserialize, Serialize};
 
 /// The kinds of molds, from the simplest to the most general.
@@ -14,8 +15,9 @@ pub enum MoldType {
     Sphere,
     /// `z = a x² + b y²`.
     Paraboloid,
-    /// A torus around its equator, axis along y: curvature of the equator (in x) and of the
-    /// generating circle (in y). Panels can slide along the tube as long as it is not vertical.
+    /// Any patch of a torus: normal curvatures of the parallel through the origin (in x) and of the
+    /// generating circle (in y), and geodesic curvature of the parallel. Panels can slide along the
+    /// tube as long as it is not vertical.
     Torus,
     /// A cubic polynomial without constant and linear terms.
     Cubic,
@@ -51,7 +53,8 @@ impl MoldType {
         match self {
             Self::Plane => 0,
             Self::Cylinder | Self::Sphere => 1,
-            Self::Paraboloid | Self::Torus => 2,
+            Self::Paraboloid => 2,
+            Self::Torus => 3,
             Self::Cubic => 7,
         }
     }
@@ -79,8 +82,10 @@ pub struct Mold {
     pub kind: MoldType,
     /// The parameters; those beyond [`MoldType::parameter_count`] are zero.
     ///
-    /// Cubic: factors of `x², xy, y², x³, x²y, xy², y³`. Paraboloid: of `x², y²`. Torus: curvature
-    /// of the equator and of the generating circle. Cylinder, sphere: the curvature.
+    /// Cubic: factors of `x², xy, y², x³, x²y, xy², y³`. Paraboloid: of `x², y²`. Cylinder, sphere:
+    /// the curvature. Torus: `k₁, k₂, g`, the curvatures of the parallel and of the generating
+    /// circle and the geodesic curvature of the parallel; its axis passes through
+    /// `(0, g, k₁) / (k₁² + g²)` in the direction `(0, k₁, −g)`, and the tube has radius `1 / k₂`.
     pub parameters: [f64; MAX_PARAMETERS],
 }
 
@@ -152,7 +157,15 @@ impl Mold {
                     fyy: 2.0 * c + 2.0 * g * x + 6.0 * h * y,
                 }
             }
-            MoldType::Cylinder | MoldType::Sphere | MoldType::Torus => {
+            MoldType::Torus => self.torus(x, y).map_or(UNREACHED, |z| Height {
+                f: z.value,
+                fx: z.first[0],
+                fy: z.first[1],
+                fxx: z.second[0][0],
+                fxy: z.second[0][1],
+                fyy: z.second[1][1],
+            }),
+            MoldType::Cylinder | MoldType::Sphere => {
                 let z = self.round(x, y);
                 Height {
                     f: z.value,
@@ -182,34 +195,41 @@ impl Mold {
                 rows[1] = [2.0 * x, y, 0.0, 3.0 * xx, 2.0 * xy, yy, 0.0];
                 rows[2] = [0.0, x, 2.0 * y, 0.0, xx, 2.0 * xy, 3.0 * yy];
             }
-            MoldType::Cylinder | MoldType::Sphere | MoldType::Torus => {
-                let z = self.round(x, y);
-                let along = |k: usize| [z.first[k], z.second[0][k], z.second[1][k]];
-                let (first, second) = (along(2), along(3));
-                for row in 0..3 {
-                    match self.kind {
-                        MoldType::Cylinder => rows[row][0] = first[row],
-                        MoldType::Sphere => rows[row][0] = first[row] + second[row],
-                        _ => rows[row][..2].copy_from_slice(&[first[row], second[row]]),
+            MoldType::Torus => match self.torus(x, y) {
+                Some(z) => {
+                    for i in 0..3 {
+                        rows[0][i] = z.first[2 + i];
+                        rows[1][i] = z.second[0][2 + i];
+                        rows[2][i] = z.second[1][2 + i];
                     }
+                }
+                None => rows.iter_mut().for_each(|row| row[..3].fill(f64::NAN)),
+            },
+            MoldType::Cylinder | MoldType::Sphere => {
+                let z = self.round(x, y);
+                for (row, [along_x, along_y]) in rows.iter_mut().zip([
+                    [z.first[2], z.first[3]],
+                    [z.second[0][2], z.second[0][3]],
+                    [z.second[1][2], z.second[1][3]],
+                ]) {
+                    let is_sphere = self.kind == MoldType::Sphere;
+                    row[0] = if is_sphere { along_x + along_y } else { along_x };
                 }
             }
         }
         rows
     }
 
-    /// The torus height as a function of x, y and the two curvatures.
+    /// The height of a cylinder or sphere as a function of x, y and two curvatures, which are those
+    /// of the parallel and of the generating circle of a torus at its equator.
     ///
     /// The generating circle has the height `p = k₂ y² / (1 + √(1 − k₂² y²))`; turning it about
     /// the axis at height `1/k₁` gives `z = q / (1 + √(1 − k₁ q))` with
     /// `q = 2 p + k₁ (x² − p²)`, which stays exact where a curvature vanishes (a cylinder) and is
     /// a sphere for equal curvatures.
-    fn round(&self, x: f64, y: f64) -> Taylor {
-        let (k1, k2) = match self.kind {
-            MoldType::Cylinder => (self.parameters[0], 0.0),
-            MoldType::Sphere => (self.parameters[0], self.parameters[0]),
-            _ => (self.parameters[0], self.parameters[1]),
-        };
+    fn round(&self, x: f64, y: f64) -> Taylor<4> {
+        let k1 = self.parameters[0];
+        let k2 = if self.kind == MoldType::Sphere { k1 } else { 0.0 };
         let [x, y, k1, k2] =
             [(x, 0), (y, 1), (k1, 2), (k2, 3)].map(|(v, i)| Taylor::variable(v, i));
         let one = Taylor::constant(1.0);
@@ -217,83 +237,78 @@ impl Mold {
         let q = p.add(p).add(k1.mul(x.mul(x).sub(p.mul(p))));
         q.div(one.add(one.sub(k1.mul(q)).sqrt()))
     }
-}
 
-/// A function of four variables with first and second derivatives.
-#[derive(Clone, Copy)]
-struct Taylor {
-    value: f64,
-    first: [f64; 4],
-    second: [[f64; 4]; 4],
-}
-
-impl Taylor {
-    fn constant(value: f64) -> Self {
-        Self { value, first: [0.0; 4], second: [[0.0; 4]; 4] }
-    }
-
-    fn variable(value: f64, index: usize) -> Self {
-        let mut made = Self::constant(value);
-        made.first[index] = 1.0;
-        made
-    }
-
-    fn zip(self, other: Self, f: impl Fn(f64, f64) -> f64) -> Self {
-        let mut out = self;
-        out.value = f(self.value, other.value);
-        for i in 0..4 {
-            out.first[i] = f(self.first[i], other.first[i]);
-            for j in 0..4 {
-                out.second[i][j] = f(self.second[i][j], other.second[i][j]);
+    /// The torus height as a function of x, y and the three parameters `k₁, k₂, g`; `None` beyond
+    /// its reach.
+    ///
+    /// Turning `(x, y, z)` about the axis into the plane `x = 0` gives `(y + g d, z + k₁ d)` with
+    /// `d = −x² / (1 − σ + √((k₁² + g²) x² + (1 − σ)²))` and `σ = g y + k₁ z`, which stays exact as
+    /// the axis moves to infinity. There the generating circle has the height
+    /// `p(t) = k₂ t² / (1 + √(1 − k₂² t²))`, so the height is the root of
+    /// `z + k₁ d − p(y + g d)`.
+    fn torus(&self, x: f64, y: f64) -> Option<Taylor<5>> {
+        let [k1, k2, g, ..] = self.parameters;
+        let squared = k1 * k1 + g * g;
+        let mut z = 0.5 * (k1 * x * x + k2 * y * y);
+        let scale = x.abs() + y.abs() + z.abs();
+        let mut is_root = false;
+        for _ in 0..30 {
+            let below = 1.0 - g * y - k1 * z;
+            let w = (squared * x * x + below * below).sqrt();
+            let (sum, along_w) = (below + w, -k1 * below / w);
+            let d = -x * x / sum;
+            let d_z = d * (k1 - along_w) / sum;
+            let t = y + g * d;
+            let root = (1.0 - k2 * k2 * t * t).sqrt();
+            let value = z + k1 * d - k2 * t * t / (1.0 + root);
+            let slope = 1.0 + k1 * d_z - k2 * t / root * g * d_z;
+            // Beyond the axis or where the tube has turned over there is no height; NaN as well.
+            if !(below > 0.0 && slope > 0.0) {
+                return None;
+            }
+            let step = value / slope;
+            z -= step;
+            if is_root {
+                break;
+            }
+            // The step after a small one only removes rounding.
+            is_root = step.abs() <= 1e-9 * scale;
+        }
+        if !is_root {
+            return None;
+        }
+        let constants = [x, y, k1, k2, g, z];
+        let [x, y, k1, k2, g, z] = std::array::from_fn(|i| Taylor::<6>::variable(constants[i], i));
+        let one = Taylor::constant(1.0);
+        let below = one.sub(g.mul(y)).sub(k1.mul(z));
+        let xx = x.mul(x);
+        let w = xx.mul(k1.mul(k1).add(g.mul(g))).add(below.mul(below)).sqrt();
+        let d = Taylor::constant(0.0).sub(xx.div(below.add(w)));
+        let t = y.add(g.mul(d));
+        let tube = k2.mul(t);
+        let p = tube.mul(t).div(one.add(one.sub(tube.mul(tube)).sqrt()));
+        let implicit = z.add(k1.mul(d)).sub(p);
+        // Implicit differentiation of `implicit = 0` for z.
+        let (first, second) = (implicit.first, implicit.second);
+        let mut height = Taylor::<5>::constant(z.value);
+        for i in 0..5 {
+            height.first[i] = -first[i] / first[5];
+        }
+        for i in 0..5 {
+            for j in 0..5 {
+                let (fi, fj) = (height.first[i], height.first[j]);
+                let sum =
+                    second[i][j] + second[i][5] * fj + second[5][j] * fi + second[5][5] * fi * fj;
+                height.second[i][j] = -sum / first[5];
             }
         }
-        out
-    }
-
-    fn add(self, other: Self) -> Self {
-        self.zip(other, |a, b| a + b)
-    }
-
-    fn sub(self, other: Self) -> Self {
-        self.zip(other, |a, b| a - b)
-    }
-
-    fn mul(self, other: Self) -> Self {
-        let mut out = Self::constant(self.value * other.value);
-        for i in 0..4 {
-            out.first[i] = self.value * other.first[i] + self.first[i] * other.value;
-            for j in 0..4 {
-                out.second[i][j] = self.value * other.second[i][j]
-                    + self.first[i] * other.first[j]
-                    + self.first[j] * other.first[i]
-                    + self.second[i][j] * other.value;
-            }
-        }
-        out
-    }
-
-    /// Composition with a function of one variable, given its value and two derivatives.
-    fn then(self, value: f64, d1: f64, d2: f64) -> Self {
-        let mut out = Self::constant(value);
-        for i in 0..4 {
-            out.first[i] = d1 * self.first[i];
-            for j in 0..4 {
-                out.second[i][j] = d1 * self.second[i][j] + d2 * self.first[i] * self.first[j];
-            }
-        }
-        out
-    }
-
-    fn sqrt(self) -> Self {
-        let root = self.value.sqrt();
-        self.then(root, 0.5 / root, -0.25 / (root * self.value))
-    }
-
-    fn div(self, other: Self) -> Self {
-        let r = 1.0 / other.value;
-        self.mul(other.then(r, -r * r, 2.0 * r * r * r))
+        Some(height)
     }
 }
+
+/// Beyond the reach of a round mold.
+const UNREACHED: Height =
+    Height { f: f64::NAN, fx: f64::NAN, fy: f64::NAN, fxx: f64::NAN, fxy: f64::NAN, fyy: f64::NAN };
 
 #[cfg(test)]
 mod tests {
@@ -363,6 +378,27 @@ mod tests {
             assert_close((to_axis - (3.0 - 1.0 / k2)).hypot(y), 1.0, 1e-14);
         }
         assert!(mold(MoldType::Sphere, 1.0, 0.0).height(1.0, 1.0).is_nan());
+        assert!(mold(MoldType::Torus, 0.2, 1.0).height(0.1, 1.1).is_nan());
+    }
+
+    #[test]
+    fn tori_of_any_latitude_lie_on_their_surfaces() {
+        let (big, small) = (3.0, 1.0);
+        // The outer equator, a place above it, the top circle, the inner side, the inner equator.
+        for latitude in [0.0, 0.8, std::f64::consts::FRAC_PI_2, 2.2, 3.1, -1.0] {
+            let (sin, cos) = f64::sin_cos(latitude);
+            // Seen from inside the tube, y towards rising latitude.
+            let to_axis = big + small * cos;
+            let mut mold = Mold::flat(MoldType::Torus);
+            mold.parameters[..3].copy_from_slice(&[cos / to_axis, 1.0 / small, sin / to_axis]);
+            for (x, y) in [(0.0, 0.0), (0.4, 0.3), (-0.3, 0.5), (0.2, -0.6)] {
+                let z = mold.height(x, y);
+                // Away from the axis, along the axis.
+                let away = to_axis - sin * y - cos * z;
+                let height = small * sin + cos * y - sin * z;
+                assert_close((away.hypot(x) - big).hypot(height), small, 1e-13);
+            }
+        }
     }
 
     #[test]

@@ -1,5 +1,6 @@
 //! Flat outlines of panels on planar and cylindrical molds, to be cut from sheets and bent.
 
+use crate::error::PanelingError;
 use crate::mold::{Mold, MoldType};
 use crate::paneling::Paneling;
 use crate::panels::PanelSet;
@@ -7,18 +8,44 @@ use glam::DVec2;
 
 /// Free space between two outlines of a sheet, as a share of the larger one's size.
 const SPACING: f64 = 0.1;
+/// Half the length of the mark that shows the bending axis, as a share of the panel's breadth.
+const AXIS_MARK: f64 = 0.3;
 
 /// A panel unrolled into the plane, seen against the normals of the surface.
 #[derive(Clone, Debug, PartialEq)]
 pub struct FlatPanel {
     /// Index of the panel.
     pub panel: usize,
+    /// Index of its mold.
+    pub mold: usize,
+    /// Index of the sheet it lies on.
+    pub sheet: usize,
     /// The border, counterclockwise, at the samples of its seams; lengths in model units.
     pub outline: Vec<DVec2>,
     /// The middle of the outline's points: a place for the number of the panel.
     pub middle: DVec2,
     /// Smaller side of the outline's bounding box.
     pub breadth: f64,
+    /// How a panel on a cylinder is bent.
+    pub bend: Option<Bend>,
+}
+
+/// How a flat panel is bent to a cylinder.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Bend {
+    /// Ends of a mark parallel to the axis of the cylinder.
+    pub mark: [DVec2; 2],
+    /// Radius of the cylinder; positive if the panel bends up, towards whoever looks at the sheet.
+    pub radius: f64,
+}
+
+/// Flat panels on sheets that stand side by side.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct FlatSheets {
+    /// The panels, those of one mold one after the other.
+    pub panels: Vec<FlatPanel>,
+    /// Lower left and upper right corner of every sheet.
+    pub sheets: Vec<[DVec2; 2]>,
 }
 
 impl MoldType {
@@ -64,28 +91,116 @@ impl Paneling {
             .collect()
     }
 
-    /// All panels that can be unrolled, side by side in rows without overlap.
-    #[must_use]
-    pub fn flat_panels(&self, set: &PanelSet) -> Vec<FlatPanel> {
-        let mut flat = Vec::new();
-        for panel in 0..set.len() {
-            let Some(outline) = self.flat_outline(set, panel) else { continue };
-            let (min, max) = bounds(&outline);
-            let outline: Vec<DVec2> = outline.iter().map(|p| *p - min).collect();
-            let middle = outline.iter().sum::<DVec2>() / outline.len() as f64;
-            flat.push(FlatPanel { panel, outline, middle, breadth: (max - min).min_element() });
+    /// All panels that can be unrolled, without overlap on sheets of this width and height, or on
+    /// one sheet about as wide as high. The axes of all cylinders stand upright, so that a sheet
+    /// with a grain can be used.
+    ///
+    /// # Errors
+    /// [`PanelingError::SheetTooSmall`] names the first panel that is larger than a sheet,
+    /// [`PanelingError::BadOption`] a sheet without area.
+    pub fn flat_panels(
+        &self,
+        set: &PanelSet,
+        sheet: Option<[f64; 2]>,
+    ) -> Result<FlatSheets, PanelingError> {
+        if let Some(&value) = sheet.iter().flatten().find(|v| !(**v > 0.0 && v.is_finite())) {
+            return Err(PanelingError::BadOption { name: "a side of the sheet", value });
         }
-        let largest = flat.iter().fold(DVec2::ZERO, |size, f| size.max(bounds(&f.outline).1));
-        let cell = largest + DVec2::splat(SPACING * largest.max_element());
-        // About as wide as high.
-        let columns = ((flat.len() as f64 * cell.y / cell.x).sqrt().ceil() as usize).max(1);
-        for (k, panel) in flat.iter_mut().enumerate() {
-            // The first row is on top.
-            let shift = cell * DVec2::new((k % columns) as f64, -((k / columns) as f64));
-            panel.outline.iter_mut().for_each(|p| *p += shift);
-            panel.middle += shift;
+        let mut order: Vec<usize> = (0..set.len()).collect();
+        // A stable sort: panels of a mold keep their order.
+        order.sort_by_key(|&p| self.labels[p]);
+        let mut panels: Vec<FlatPanel> =
+            order.into_iter().filter_map(|p| self.flat_panel(set, p)).collect();
+        let sizes: Vec<DVec2> = panels.iter().map(|f| bounds(&f.outline).1).collect();
+        let largest = sizes.iter().fold(DVec2::ZERO, |size, s| size.max(*s));
+        let spacing = SPACING * largest.max_element();
+        let [width, height] = sheet.unwrap_or_else(|| {
+            let area: f64 = sizes.iter().map(|s| (s.x + spacing) * (s.y + spacing)).sum();
+            [area.sqrt().max(largest.x) + 2.0 * spacing, f64::INFINITY]
+        });
+        let mut packer =
+            Packer { width, height, spacing, at: DVec2::splat(spacing), ..Packer::default() };
+        for (flat, size) in panels.iter_mut().zip(&sizes) {
+            if !(size.x + 2.0 * spacing <= width && size.y + 2.0 * spacing <= height) {
+                let size = [size.x + 2.0 * spacing, size.y + 2.0 * spacing];
+                return Err(PanelingError::SheetTooSmall {
+                    panel: flat.panel,
+                    size,
+                    sheet: [width, height],
+                });
+            }
+            let (sheet, corner) = packer.place(*size);
+            flat.move_by(corner);
+            flat.sheet = sheet;
         }
-        flat
+        let count = panels.last().map_or(0, |f| f.sheet + 1);
+        let high = if height.is_finite() { height } else { packer.at.y + packer.row + spacing };
+        let left = |k: usize| k as f64 * (width + spacing);
+        let sheets = (0..count)
+            .map(|k| [DVec2::new(left(k), 0.0), DVec2::new(left(k) + width, high)])
+            .collect();
+        for flat in &mut panels {
+            flat.move_by(DVec2::new(left(flat.sheet), 0.0));
+        }
+        Ok(FlatSheets { panels, sheets })
+    }
+
+    /// A panel with the lower left corner of its bounding box at the origin.
+    fn flat_panel(&self, set: &PanelSet, panel: usize) -> Option<FlatPanel> {
+        let outline = self.flat_outline(set, panel)?;
+        let (min, max) = bounds(&outline);
+        let outline: Vec<DVec2> = outline.iter().map(|p| *p - min).collect();
+        let middle = outline.iter().sum::<DVec2>() / outline.len() as f64;
+        let breadth = (max - min).min_element();
+        let mold = self.labels[panel];
+        let curvature = self.molds[mold].parameters[0];
+        let is_bent = self.molds[mold].kind == MoldType::Cylinder && curvature != 0.0;
+        let up = DVec2::Y * (AXIS_MARK * breadth);
+        let bend =
+            is_bent.then(|| Bend { mark: [middle - up, middle + up], radius: 1.0 / curvature });
+        Some(FlatPanel { panel, mold, sheet: 0, outline, middle, breadth, bend })
+    }
+}
+
+impl FlatPanel {
+    fn move_by(&mut self, shift: DVec2) {
+        self.outline.iter_mut().for_each(|p| *p += shift);
+        self.middle += shift;
+        if let Some(bend) = &mut self.bend {
+            bend.mark.iter_mut().for_each(|p| *p += shift);
+        }
+    }
+}
+
+/// Fills sheets row by row, from the bottom.
+#[derive(Default)]
+struct Packer {
+    width: f64,
+    height: f64,
+    spacing: f64,
+    /// Where the next outline goes, and the height of the row so far.
+    at: DVec2,
+    row: f64,
+    sheet: usize,
+}
+
+impl Packer {
+    /// Sheet and lower left corner for an outline of this size, which fits on a sheet.
+    fn place(&mut self, size: DVec2) -> (usize, DVec2) {
+        let gap = self.spacing;
+        if self.at.x + size.x + gap > self.width {
+            self.at = DVec2::new(gap, self.at.y + self.row + gap);
+            self.row = 0.0;
+        }
+        if self.at.y + size.y + gap > self.height {
+            self.at = DVec2::splat(gap);
+            self.row = 0.0;
+            self.sheet += 1;
+        }
+        let corner = self.at;
+        self.at.x += size.x + gap;
+        self.row = self.row.max(size.y);
+        (self.sheet, corner)
     }
 }
 
@@ -156,23 +271,72 @@ mod tests {
     }
 
     #[test]
-    fn outlines_lie_side_by_side() {
+    fn a_panel_of_a_cylinder_has_its_developed_area_and_edges() {
+        use bspline::{BsplineSurface, Degree, KnotVector};
+        // A quarter of a cylinder of radius 3 and length 5, exact as a rational quadratic.
+        let knots =
+            |degree, n| KnotVector::clamped_uniform(Degree::new(degree).unwrap(), n).unwrap();
+        let (radius, length, w) = (3.0, 5.0, 0.5_f64.sqrt());
+        let arc = [[radius, 0.0], [radius, radius], [0.0, radius]];
+        let points = arc.iter().flat_map(|&[x, z]| [0.0, length].map(|y| DVec3::new(x, y, z)));
+        let weights = Some(vec![1.0, 1.0, w, w, 1.0, 1.0]);
+        let surface =
+            BsplineSurface::new(knots(2, 3), knots(1, 2), points.collect(), weights).unwrap();
+        let (m, n) = (4, 2);
+        let layout = Layout::generate(Pattern::Quad, m, n, [false; 2]).unwrap();
+        let set = PanelSet::new(&surface, &layout).unwrap();
+        let options = Options { mold_type: MoldType::Cylinder, ..Options::with_molds(1) };
+        let result = panel(&set, &options).unwrap();
+        let flat = result.flat_panels(&set, None).unwrap().panels;
+        let mut total = 0.0;
+        for panel in &flat {
+            let outline = &panel.outline;
+            let next = |i: usize| outline[(i + 1) % outline.len()];
+            total += 0.5 * (0..outline.len()).map(|i| outline[i].perp_dot(next(i))).sum::<f64>();
+            // The straight edges run along the axis, the others along the arc.
+            let [from, to] = [set.corners(panel.panel)[0][0], set.corners(panel.panel)[1][0]];
+            let angle = |u: f64| {
+                let p = surface.point(u, 0.0);
+                p.z.atan2(p.x)
+            };
+            let perimeter: f64 = (0..outline.len()).map(|i| outline[i].distance(next(i))).sum();
+            let expected = 2.0 * (radius * (angle(to) - angle(from)).abs() + length / n as f64);
+            assert_close(perimeter, expected, 1e-8 * expected);
+            assert_close(panel.bend.unwrap().radius.abs(), radius, 1e-8 * radius);
+        }
+        let expected = radius * std::f64::consts::FRAC_PI_2 * length;
+        assert_close(total, expected, 1e-8 * expected);
+    }
+
+    #[test]
+    fn outlines_lie_side_by_side_on_their_sheets() {
         let (set, result) = paneling(MoldType::Cylinder);
-        let flat = result.flat_panels(&set);
-        assert_eq!(flat.len(), set.len());
-        for (k, a) in flat.iter().enumerate() {
-            let area: f64 = (0..a.outline.len())
-                .map(|i| a.outline[i].perp_dot(a.outline[(i + 1) % a.outline.len()]))
-                .sum();
-            assert!(area > 0.0, "panel {} is turned over", a.panel);
-            let (min, max) = bounds(&a.outline);
-            assert!(a.middle.cmpgt(min).all() && a.middle.cmplt(max).all());
-            for b in &flat[..k] {
-                let (other_min, other_max) = bounds(&b.outline);
-                assert!(max.cmplt(other_min).any() || min.cmpgt(other_max).any());
+        let size = 0.3 * set.diagonal();
+        for sheet in [None, Some([2.0 * size, size])] {
+            let FlatSheets { panels: flat, sheets } = result.flat_panels(&set, sheet).unwrap();
+            assert_eq!(flat.len(), set.len());
+            assert_eq!(sheet.is_none(), sheets.len() == 1);
+            assert!(flat.windows(2).all(|f| f[0].mold <= f[1].mold));
+            for (k, a) in flat.iter().enumerate() {
+                let area: f64 = (0..a.outline.len())
+                    .map(|i| a.outline[i].perp_dot(a.outline[(i + 1) % a.outline.len()]))
+                    .sum();
+                assert!(area > 0.0, "panel {} is turned over", a.panel);
+                let (min, max) = bounds(&a.outline);
+                assert!(a.middle.cmpgt(min).all() && a.middle.cmplt(max).all());
+                let [low, high] = sheets[a.sheet];
+                assert!(min.cmpge(low).all() && max.cmple(high).all());
+                for b in &flat[..k] {
+                    let (other_min, other_max) = bounds(&b.outline);
+                    assert!(max.cmplt(other_min).any() || min.cmpgt(other_max).any());
+                }
             }
         }
+        let error = result.flat_panels(&set, Some([0.01 * size, size])).unwrap_err().to_string();
+        assert!(error.starts_with("panel ") && error.contains("larger sheet"), "{error}");
+        let error = result.flat_panels(&set, Some([-1.0, size])).unwrap_err();
+        assert!(matches!(error, PanelingError::BadOption { .. }));
         let (set, result) = paneling(MoldType::Sphere);
-        assert!(result.flat_panels(&set).is_empty());
+        assert_eq!(result.flat_panels(&set, None).unwrap(), FlatSheets::default());
     }
 }

@@ -50,8 +50,8 @@ impl Options {
             molds,
             mold_type: MoldType::Cubic,
             slope_weight: 0.5,
-            rounds: 15,
-            seam_steps: 8,
+            rounds: 30,
+            seam_steps: 40,
         }
     }
 
@@ -120,7 +120,7 @@ impl Paneling {
 }
 
 /// A seam step that lowers the energy by less than this share is the last.
-const SEAM_STALL: f64 = 1e-2;
+const SEAM_STALL: f64 = 3e-2;
 
 /// Clusters the panels, fits molds and poses, and measures the result.
 ///

@@ -260,6 +260,17 @@ impl PanelSet {
         &self.edges.points[seam.edge * SEAM_SAMPLES..(seam.edge + 1) * SEAM_SAMPLES]
     }
 
+    /// For every panel the seams around it, and which of their two panels it is.
+    pub(crate) fn incident_seams(&self) -> Vec<Vec<(usize, usize)>> {
+        let mut incident = vec![Vec::new(); self.len()];
+        for (s, seam) in self.seams.iter().enumerate() {
+            for (side, &p) in seam.panels.iter().enumerate() {
+                incident[p].push((s, side));
+            }
+        }
+        incident
+    }
+
     /// Points and normals of a panel's samples.
     pub(crate) fn panel_samples(&self, panel: usize) -> (&[DVec3], &[DVec3]) {
         let range = self.starts[panel]..self.starts[panel + 1];

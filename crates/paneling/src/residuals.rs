@@ -4,7 +4,7 @@
 //! A pose moves by six numbers in its own frame: a displacement `δ` and a rotation `ω`, after
 //! which local coordinates are `L' = exp(ω) L − δ`.
 
-use crate::mold::{MAX_PARAMETERS, Mold};
+use crate::mold::{MAX_PARAMETERS, Mold, MoldType};
 use crate::panels::Pose;
 use glam::{DMat3, DVec3};
 
@@ -37,7 +37,27 @@ pub(crate) fn sample_residual(mold: &Mold, weight: f64, local: DVec3, normal: DV
     [local.z - z.f, weight * (z.fx + normal.x / nz), weight * (z.fy + normal.y / nz)]
 }
 
-/// Sum of squares of a panel's residuals.
+/// How far the middle of a panel may slide from the origin of a polynomial mold, in panel sizes
+/// (half a panel's width): the mold is then at most about three panels wide. Round molds have no
+/// limit, for they are the same everywhere.
+const REACH: f64 = 2.0;
+const REACH_WEIGHT: f64 = 0.01;
+
+/// What a panel pays for lying further out on its mold than the reach: residual and its
+/// derivatives in the pose, `w (x² + y² − reach²)` at the panel's middle.
+pub(crate) fn reach(mold: &Mold, middle: DVec3) -> Option<(f64, [f64; POSE])> {
+    let beyond = middle.x * middle.x + middle.y * middle.y - REACH * REACH;
+    let is_polynomial = matches!(mold.kind, MoldType::Paraboloid | MoldType::Cubic);
+    if !is_polynomial || beyond <= 0.0 {
+        return None;
+    }
+    let by_point = 2.0 * REACH_WEIGHT * DVec3::new(middle.x, middle.y, 0.0);
+    let turn = middle.cross(by_point);
+    let row = [-by_point.x, -by_point.y, -by_point.z, turn.x, turn.y, turn.z];
+    Some((REACH_WEIGHT * beyond, row))
+}
+
+/// Sum of squares of a panel's residuals; the last sample is its middle.
 pub(crate) fn panel_energy(
     mold: &Mold,
     weight: f64,
@@ -51,7 +71,8 @@ pub(crate) fn panel_energy(
         let r = sample_residual(mold, weight, to_local * (*p - pose.origin), to_local * *n);
         sum += r[0] * r[0] + r[1] * r[1] + r[2] * r[2];
     }
-    sum
+    let beyond = points.last().and_then(|p| reach(mold, to_local * (*p - pose.origin)));
+    sum + beyond.map_or(0.0, |(r, _)| r * r)
 }
 
 /// Residuals of one sample and their derivatives in the pose.
@@ -180,7 +201,6 @@ pub(crate) fn seam_side(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::mold::MoldType;
     use geom_core::assert_close;
 
     fn setting(kind: MoldType) -> (Mold, Pose, DVec3, DVec3) {
@@ -249,6 +269,24 @@ mod tests {
                     assert_close(rows[row][i], (a[row] - b[row]) / (2.0 * h), 1e-8);
                 }
             }
+        }
+    }
+
+    #[test]
+    fn the_reach_grows_from_zero_and_its_row_matches_central_differences() {
+        let mold = Mold::flat(MoldType::Cubic);
+        assert_eq!(reach(&mold, DVec3::new(1.2, 1.5, 0.3)), None);
+        assert_eq!(reach(&Mold::flat(MoldType::Sphere), DVec3::new(9.0, 0.0, 0.3)), None);
+        let pose = Pose { origin: DVec3::ZERO, rotation: DMat3::IDENTITY };
+        let point = DVec3::new(1.9, -1.1, 0.3);
+        let (_, row) = reach(&mold, point).unwrap();
+        for (i, entry) in row.into_iter().enumerate() {
+            let at = |h: f64| {
+                let mut step = [0.0; POSE];
+                step[i] = h;
+                reach(&mold, moved(&pose, &step).to_local(point)).unwrap().0
+            };
+            assert_close(entry, (at(1e-6) - at(-1e-6)) / 2e-6, 1e-9);
         }
     }
 

@@ -1,26 +1,15 @@
 //! The joint seam step: poses and molds together, against kinks and gaps.
 //!
-//! The alternation fits every panel to the design and never looks at its neighbours. Here all
-//! poses and all molds move at once to lower the sum of squared gaps and kinks along the seams,
-//! while a weaker term keeps them on the design. The Gauss-Newton systems are solved by
-//! preconditioned conjugate gradients on the Jacobian blocks of the seams: the shared molds would
-//! fill a factorisation with a dense border.
+//! The fit brings every panel near the design and never looks at its neighbours. Here all poses and
+//! all molds move at once to lower the sum of squared gaps and kinks along the seams, while a
+//! weaker term keeps them on the design.
 
 use crate::fit::{EXACT, Fit};
-use crate::mold::MAX_PARAMETERS;
-use crate::panels::PanelSet;
-use crate::panels::SEAM_SAMPLES;
-use crate::residuals::{POSE, SIDE, foot, moved, sample_mold_rows, sample_pose_rows, seam_side};
-use crate::small::{factor, solve_factored};
-use glam::DVec3;
+use crate::panels::{PanelSet, SEAM_SAMPLES, Seam};
+use crate::residuals::foot;
+use crate::retraction::moved_on;
+use crate::seam_system::{System, Unknowns};
 use rayon::prelude::*;
-
-/// Rows of a seam: a gap and two components of the kink per sample.
-const ROWS: usize = 3 * SEAM_SAMPLES;
-/// Relative residual at which the conjugate gradients stop.
-const CG_TOLERANCE: f64 = 0.03;
-/// Most conjugate gradient steps per linearisation.
-const CG_STEPS: usize = 40;
 
 /// Settings of the joint seam step.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -35,57 +24,12 @@ pub(crate) struct SeamOptions {
     pub(crate) stall: f64,
 }
 
-/// Jacobian of a seam: both sides, the second with its sign turned.
-struct SeamRows {
-    residual: [f64; ROWS],
-    sides: [[[f64; SIDE]; ROWS]; 2],
-}
-
-/// Normal equations of a panel's distance to the design.
-struct DesignBlock {
-    matrix: [[f64; SIDE]; SIDE],
-    gradient: [f64; SIDE],
-}
-
-/// A point of the space of all poses and molds.
-#[derive(Clone)]
-struct Unknowns {
-    poses: Vec<[f64; POSE]>,
-    molds: Vec<[f64; MAX_PARAMETERS]>,
-}
-
-impl Unknowns {
-    fn zero(poses: usize, molds: usize) -> Self {
-        Self { poses: vec![[0.0; POSE]; poses], molds: vec![[0.0; MAX_PARAMETERS]; molds] }
-    }
-
-    fn dot(&self, other: &Self) -> f64 {
-        // Serial and in order: the same for every number of threads.
-        let poses: f64 = self
-            .poses
-            .iter()
-            .zip(&other.poses)
-            .map(|(a, b)| a.iter().zip(b).map(|(x, y)| x * y).sum::<f64>())
-            .sum();
-        let molds: f64 = self
-            .molds
-            .iter()
-            .zip(&other.molds)
-            .map(|(a, b)| a.iter().zip(b).map(|(x, y)| x * y).sum::<f64>())
-            .sum();
-        poses + molds
-    }
-
-    /// `self += factor · other`.
-    fn add(&mut self, factor: f64, other: &Self) {
-        for (a, b) in self.poses.iter_mut().zip(&other.poses) {
-            a.iter_mut().zip(b).for_each(|(x, y)| *x += factor * y);
-        }
-        for (a, b) in self.molds.iter_mut().zip(&other.molds) {
-            a.iter_mut().zip(b).for_each(|(x, y)| *x += factor * y);
-        }
-    }
-}
+/// Damping of the first step, a share of the diagonal.
+const FIRST_DAMPING: f64 = 1e-2;
+const LEAST_DAMPING: f64 = 1e-8;
+const MOST_DAMPING: f64 = 1e4;
+/// Refused steps in a row after which nothing can be gained.
+const TRIES: usize = 4;
 
 /// Lowers kinks and gaps of a fit; returns the energy before and after every accepted step.
 ///
@@ -97,34 +41,42 @@ pub(crate) fn improve(
     weights: &[f64],
 ) -> Vec<f64> {
     assert_eq!(weights.len(), set.seams.len(), "one weight per seam");
-    let incident = incident_seams(set);
-    let mut energy = total_energy(set, fit, options, weights);
-    let mut history = vec![energy];
-    let mut damping = 1e-4;
+    let incident = set.incident_seams();
+    let mut energy = Energy::new(set, fit, options, weights);
+    let mut history = vec![energy.total];
+    let mut damping = vec![FIRST_DAMPING; fit.molds.len()];
     let mut step = 0;
     let exact = EXACT * set.edges.points.len() as f64;
-    while step < options.steps && energy > exact {
+    while step < options.steps && energy.total > exact {
         let system = System::linearize(set, fit, options, weights, &incident);
         let mut accepted = false;
         // A refused step is tried again with more damping on the same linearisation.
-        for _ in 0..4 {
-            let change = system.solve(fit, damping);
-            let trial = applied(fit, &change);
-            let next = total_energy(set, &trial, options, weights);
+        for _ in 0..TRIES {
+            let solution = system.solve(fit, &damping);
+            let mut trial = applied(set, fit, &solution.step);
+            let mut next = Energy::new(set, &trial, options, weights);
+            let worse = energy.adapt(&next, &solution.promised, &mut damping);
+            if worse.contains(&true) {
+                // A few molds that went astray should not cost the others their step.
+                let part = without(&trial, fit, &worse);
+                let part_energy = Energy::new(set, &part, options, weights);
+                if !(next.total <= part_energy.total) {
+                    (trial, next) = (part, part_energy);
+                }
+            }
             step += 1;
-            if next < energy {
-                accepted = true;
-                let share = (energy - next) / energy;
+            let (before, cg) = (energy.total, solution.iterations);
+            tracing::debug!(step, before, energy = next.total, cg, "seam step");
+            accepted = next.total < before;
+            if accepted {
                 *fit = trial;
                 energy = next;
-                history.push(energy);
-                damping = (damping * 0.1).max(1e-9);
-                if share < options.stall {
+                history.push(energy.total);
+                if energy.total > (1.0 - options.stall) * before {
                     step = options.steps;
                 }
                 break;
             }
-            damping *= 10.0;
         }
         if !accepted {
             break;
@@ -134,292 +86,100 @@ pub(crate) fn improve(
     history
 }
 
-/// For every panel the seams around it and which of their sides it is.
-fn incident_seams(set: &PanelSet) -> Vec<Vec<(usize, usize)>> {
-    let mut incident = vec![Vec::new(); set.len()];
-    for (s, seam) in set.seams.iter().enumerate() {
-        for (side, &p) in seam.panels.iter().enumerate() {
-            incident[p].push((s, side));
-        }
-    }
-    incident
+/// The energy, and the part of it that each mold is to blame for.
+struct Energy {
+    total: f64,
+    molds: Vec<f64>,
 }
 
-fn total_energy(set: &PanelSet, fit: &Fit, options: &SeamOptions, weights: &[f64]) -> f64 {
-    let seams: Vec<f64> = set
-        .seams
-        .par_iter()
-        .zip(weights)
-        .with_min_len(64)
-        .map(|(seam, weight)| {
-            let (points, normals) = set.edge_samples(seam.edge);
-            let mut sum = 0.0;
-            for k in 0..SEAM_SAMPLES {
-                let [a, b] = seam.panels.map(|p| {
-                    let pose = &fit.poses[p];
-                    let to_local = pose.rotation.transpose();
-                    let local = to_local * (points[k] - pose.origin);
-                    let (t, m) = foot(&fit.molds[fit.labels[p]], local, to_local * normals[k]);
-                    (t, pose.rotation * m)
-                });
-                let tilt = a.1 - b.1;
-                // Only the tangential part counts, as in the rows.
-                let along = tilt.dot(normals[k]);
-                let gap = options.gap_weight * (a.0 - b.0);
-                sum += gap * gap + tilt.length_squared() - along * along;
-            }
-            weight * sum
-        })
-        .collect();
-    let design: Vec<f64> =
-        (0..set.len()).into_par_iter().with_min_len(64).map(|p| fit.panel_energy(set, p)).collect();
-    let weight = options.design_weight * options.design_weight;
-    seams.iter().sum::<f64>() + weight * design.iter().sum::<f64>()
-}
-
-fn applied(fit: &Fit, change: &Unknowns) -> Fit {
-    let mut trial = fit.clone();
-    for (pose, step) in trial.poses.iter_mut().zip(&change.poses) {
-        *pose = moved(pose, step);
-    }
-    for (mold, step) in trial.molds.iter_mut().zip(&change.molds) {
-        for (p, s) in mold.parameters.iter_mut().zip(step) {
-            *p += s;
-        }
-    }
-    trial
-}
-
-/// The Gauss-Newton system at one iterate.
-struct System<'a> {
-    set: &'a PanelSet,
-    incident: &'a [Vec<(usize, usize)>],
-    seams: Vec<SeamRows>,
-    design: Vec<DesignBlock>,
-}
-
-impl<'a> System<'a> {
-    fn linearize(
-        set: &'a PanelSet,
-        fit: &Fit,
-        options: &SeamOptions,
-        weights: &[f64],
-        incident: &'a [Vec<(usize, usize)>],
-    ) -> Self {
-        let seams = set
+impl Energy {
+    fn new(set: &PanelSet, fit: &Fit, options: &SeamOptions, weights: &[f64]) -> Self {
+        let seams: Vec<f64> = set
             .seams
             .par_iter()
             .zip(weights)
-            .with_min_len(16)
-            .map(|(seam, seam_weight)| {
-                let seam_weight = seam_weight.sqrt();
-                let (points, normals) = set.edge_samples(seam.edge);
-                let mut rows = SeamRows { residual: [0.0; ROWS], sides: [[[0.0; SIDE]; ROWS]; 2] };
-                for k in 0..SEAM_SAMPLES {
-                    let (t1, t2) = normals[k].any_orthonormal_pair();
-                    for (side, &p) in seam.panels.iter().enumerate() {
-                        let sign = if side == 0 { seam_weight } else { -seam_weight };
-                        let mold = &fit.molds[fit.labels[p]];
-                        let here = seam_side(mold, &fit.poses[p], points[k], normals[k], [t1, t2]);
-                        let values = [here.offset, here.tilt[0], here.tilt[1]];
-                        for row in 0..3 {
-                            let weight = sign * if row == 0 { options.gap_weight } else { 1.0 };
-                            rows.residual[3 * k + row] += weight * values[row];
-                            rows.sides[side][3 * k + row] = here.rows[row].map(|v| weight * v);
-                        }
-                    }
-                }
-                rows
-            })
+            .with_min_len(64)
+            .map(|(seam, weight)| weight * seam_energy(set, fit, seam, options.gap_weight))
+            .collect();
+        let design: Vec<f64> = (0..set.len())
+            .into_par_iter()
+            .with_min_len(64)
+            .map(|p| fit.panel_energy(set, p))
             .collect();
         let weight = options.design_weight * options.design_weight;
-        let design = (0..set.len())
-            .into_par_iter()
-            .with_min_len(16)
-            .map(|p| design_block(set, fit, p, weight))
-            .collect();
-        Self { set, incident, seams, design }
+        let total = seams.iter().sum::<f64>() + weight * design.iter().sum::<f64>();
+        let mut molds = vec![0.0; fit.molds.len()];
+        for (seam, energy) in set.seams.iter().zip(&seams) {
+            seam.panels.iter().for_each(|&p| molds[fit.labels[p]] += 0.5 * energy);
+        }
+        for (energy, &label) in design.iter().zip(&fit.labels) {
+            molds[label] += weight * energy;
+        }
+        Self { total, molds }
     }
 
-    /// Applies the normal matrix without damping.
-    fn apply(&self, fit: &Fit, x: &Unknowns) -> Unknowns {
-        let side_values = |p: usize| {
-            let mut values = [0.0; SIDE];
-            values[..POSE].copy_from_slice(&x.poses[p]);
-            values[POSE..].copy_from_slice(&x.molds[fit.labels[p]]);
-            values
-        };
-        let products: Vec<[f64; ROWS]> = self
-            .seams
-            .par_iter()
-            .zip(&self.set.seams)
-            .with_min_len(64)
-            .map(|(rows, seam)| {
-                let mut y = [0.0; ROWS];
-                for side in 0..2 {
-                    let values = side_values(seam.panels[side]);
-                    for (y, row) in y.iter_mut().zip(&rows.sides[side]) {
-                        *y += row.iter().zip(&values).map(|(a, b)| a * b).sum::<f64>();
-                    }
-                }
-                y
+    /// Damps molds that got worse and frees those that got better as promised; returns which got
+    /// worse. One damping for all would let the worst of many molds hold back the rest.
+    fn adapt(&self, next: &Self, promised: &[f64], damping: &mut [f64]) -> Vec<bool> {
+        let molds = self.molds.iter().zip(&next.molds).zip(promised).zip(damping);
+        molds
+            .map(|(((before, after), promised), d)| {
+                // NaN, a panel beyond the reach of a round mold, counts as worse.
+                let is_worse = !(after <= before);
+                // Nielsen's rule.
+                let gain = ((before - after) / promised).clamp(0.0, 1.0);
+                let factor = if is_worse { 8.0 } else { 1.0 - (2.0 * gain - 1.0).powi(3) };
+                *d = (*d * factor.max(0.2)).clamp(LEAST_DAMPING, MOST_DAMPING);
+                is_worse
             })
-            .collect();
-        self.gather(fit, |p| {
-            let values = side_values(p);
-            let mut out = [0.0; SIDE];
-            for (o, row) in out.iter_mut().zip(&self.design[p].matrix) {
-                *o = row.iter().zip(&values).map(|(a, b)| a * b).sum();
-            }
-            for &(s, side) in &self.incident[p] {
-                for (row, y) in self.seams[s].sides[side].iter().zip(&products[s]) {
-                    out.iter_mut().zip(row).for_each(|(o, a)| *o += a * y);
-                }
-            }
-            out
-        })
-    }
-
-    /// Sums per-panel contributions into poses and molds, in the order of the panels.
-    fn gather(&self, fit: &Fit, part: impl Fn(usize) -> [f64; SIDE] + Sync + Send) -> Unknowns {
-        let parts: Vec<[f64; SIDE]> =
-            (0..self.set.len()).into_par_iter().with_min_len(64).map(part).collect();
-        let mut out = Unknowns::zero(parts.len(), fit.molds.len());
-        for (p, values) in parts.iter().enumerate() {
-            out.poses[p].copy_from_slice(&values[..POSE]);
-            let mold = &mut out.molds[fit.labels[p]];
-            mold.iter_mut().zip(&values[POSE..]).for_each(|(o, v)| *o += v);
-        }
-        out
-    }
-
-    /// Minus the gradient.
-    fn right_hand_side(&self, fit: &Fit) -> Unknowns {
-        self.gather(fit, |p| {
-            let mut out = self.design[p].gradient.map(|g| -g);
-            for &(s, side) in &self.incident[p] {
-                let rows = &self.seams[s];
-                for (row, r) in rows.sides[side].iter().zip(&rows.residual) {
-                    out.iter_mut().zip(row).for_each(|(o, a)| *o -= a * r);
-                }
-            }
-            out
-        })
-    }
-
-    /// The step `(A + damping · diag A) x = −g` by conjugate gradients with block Jacobi.
-    fn solve(&self, fit: &Fit, damping: f64) -> Unknowns {
-        let blocks: Vec<[[f64; SIDE]; SIDE]> = (0..self.set.len())
-            .into_par_iter()
-            .with_min_len(64)
-            .map(|p| {
-                let mut block = self.design[p].matrix;
-                for &(s, side) in &self.incident[p] {
-                    for row in &self.seams[s].sides[side] {
-                        for i in 0..SIDE {
-                            for j in 0..=i {
-                                block[i][j] += row[i] * row[j];
-                            }
-                        }
-                    }
-                }
-                block
-            })
-            .collect();
-        let mut pose_blocks = vec![[[0.0; POSE]; POSE]; blocks.len()];
-        let mut mold_blocks = vec![[[0.0; MAX_PARAMETERS]; MAX_PARAMETERS]; fit.molds.len()];
-        for (p, block) in blocks.iter().enumerate() {
-            for i in 0..POSE {
-                pose_blocks[p][i].copy_from_slice(&block[i][..POSE]);
-            }
-            let mold = &mut mold_blocks[fit.labels[p]];
-            for i in 0..MAX_PARAMETERS {
-                for j in 0..=i {
-                    mold[i][j] += block[POSE + i][POSE + j];
-                }
-            }
-        }
-        let mut diagonal = Unknowns::zero(blocks.len(), fit.molds.len());
-        for (d, block) in diagonal.poses.iter_mut().zip(&mut pose_blocks) {
-            for i in 0..POSE {
-                d[i] = damping * block[i][i];
-                block[i][i] += d[i];
-            }
-        }
-        for (d, block) in diagonal.molds.iter_mut().zip(&mut mold_blocks) {
-            for i in 0..MAX_PARAMETERS {
-                d[i] = damping * block[i][i];
-                block[i][i] += d[i];
-            }
-        }
-        pose_blocks.par_iter_mut().for_each(factor);
-        mold_blocks.par_iter_mut().for_each(factor);
-        let precondition = |r: &Unknowns| {
-            let mut z = r.clone();
-            z.poses.iter_mut().zip(&pose_blocks).for_each(|(z, l)| solve_factored(l, z));
-            z.molds.iter_mut().zip(&mold_blocks).for_each(|(z, l)| solve_factored(l, z));
-            z
-        };
-        let mut x = Unknowns::zero(blocks.len(), fit.molds.len());
-        let mut r = self.right_hand_side(fit);
-        let mut z = precondition(&r);
-        let mut direction = z.clone();
-        let mut rz = r.dot(&z);
-        let goal = CG_TOLERANCE * CG_TOLERANCE * rz;
-        for _ in 0..CG_STEPS {
-            if !(rz > goal) {
-                break;
-            }
-            let mut product = self.apply(fit, &direction);
-            for ((q, d), v) in product.poses.iter_mut().zip(&diagonal.poses).zip(&direction.poses) {
-                for i in 0..POSE {
-                    q[i] += d[i] * v[i];
-                }
-            }
-            for ((q, d), v) in product.molds.iter_mut().zip(&diagonal.molds).zip(&direction.molds) {
-                for i in 0..MAX_PARAMETERS {
-                    q[i] += d[i] * v[i];
-                }
-            }
-            let curvature = direction.dot(&product);
-            if !(curvature > 0.0) {
-                break;
-            }
-            let alpha = rz / curvature;
-            x.add(alpha, &direction);
-            r.add(-alpha, &product);
-            z = precondition(&r);
-            let next = r.dot(&z);
-            let beta = next / rz;
-            rz = next;
-            let mut fresh = z.clone();
-            fresh.add(beta, &direction);
-            direction = fresh;
-        }
-        x
+            .collect()
     }
 }
 
-fn design_block(set: &PanelSet, fit: &Fit, p: usize, weight: f64) -> DesignBlock {
-    let (points, normals) = set.panel_samples(p);
-    let (pose, mold) = (&fit.poses[p], &fit.molds[fit.labels[p]]);
-    let to_local = pose.rotation.transpose();
-    let mut block = DesignBlock { matrix: [[0.0; SIDE]; SIDE], gradient: [0.0; SIDE] };
-    for (x, n) in points.iter().zip(normals) {
-        let local: DVec3 = to_local * (*x - pose.origin);
-        let (r, pose_rows) = sample_pose_rows(mold, fit.slope_weight, local, to_local * *n);
-        let mold_rows = sample_mold_rows(mold, fit.slope_weight, local);
-        for k in 0..3 {
-            let mut row = [0.0; SIDE];
-            row[..POSE].copy_from_slice(&pose_rows[k]);
-            row[POSE..].copy_from_slice(&mold_rows[k]);
-            for i in 0..SIDE {
-                for j in 0..SIDE {
-                    block.matrix[i][j] += weight * row[i] * row[j];
-                }
-                block.gradient[i] += weight * row[i] * r[k];
-            }
+/// The trial with some molds and their panels back where they were.
+fn without(trial: &Fit, fit: &Fit, molds: &[bool]) -> Fit {
+    let mut part = trial.clone();
+    for (m, _) in molds.iter().enumerate().filter(|(_, is_out)| **is_out) {
+        part.molds[m] = fit.molds[m];
+        for &p in &fit.members[m] {
+            part.poses[p] = fit.poses[p];
         }
     }
-    block
+    part
+}
+
+fn seam_energy(set: &PanelSet, fit: &Fit, seam: &Seam, gap_weight: f64) -> f64 {
+    let (points, normals) = set.edge_samples(seam.edge);
+    let mut sum = 0.0;
+    for k in 0..SEAM_SAMPLES {
+        let [a, b] = seam.panels.map(|p| {
+            let pose = &fit.poses[p];
+            let to_local = pose.rotation.transpose();
+            let local = to_local * (points[k] - pose.origin);
+            let (t, m) = foot(&fit.molds[fit.labels[p]], local, to_local * normals[k]);
+            (t, pose.rotation * m)
+        });
+        let tilt = a.1 - b.1;
+        // Only the tangential part counts, as in the rows.
+        let along = tilt.dot(normals[k]);
+        let gap = gap_weight * (a.0 - b.0);
+        sum += gap * gap + tilt.length_squared() - along * along;
+    }
+    sum
+}
+
+fn applied(set: &PanelSet, fit: &Fit, change: &Unknowns) -> Fit {
+    let mut trial = fit.clone();
+    for (mold, step) in trial.molds.iter_mut().zip(&change.molds) {
+        mold.parameters.iter_mut().zip(step).for_each(|(p, s)| *p += s);
+    }
+    trial.poses = (0..set.len())
+        .into_par_iter()
+        .with_min_len(64)
+        .map(|p| {
+            let m = fit.labels[p];
+            moved_on(set, p, &fit.poses[p], &change.poses[p], &fit.molds[m], &trial.molds[m])
+        })
+        .collect();
+    trial
 }

@@ -2,9 +2,9 @@
 //!
 //! As in Eigensatz et al. 2010 the bounds are tolerances at the seams and the cost is that of the
 //! molds and of the panels made on them. From several numbers of molds the search starts with the
-//! cheapest type that fits each cluster, then mends: molds at seams beyond the bounds get a more
-//! general type or, where there is none, are split in two, and the joint seam step weighs the
-//! seams that were beyond the bounds more. The cheapest result within the bounds wins.
+//! cheapest type that fits each cluster, then mends: the joint seam step weighs the seams that were
+//! beyond the bounds more, and once that does not help, molds at such seams get a more general type
+//! or, where there is none, are split in two. The cheapest result within the bounds wins.
 
 use crate::clustering::{self, Feature};
 use crate::error::PanelingError;
@@ -66,11 +66,14 @@ pub struct Bounded {
 }
 
 /// Most rounds of mending from one start.
-const MENDING_ROUNDS: usize = 12;
+const MENDING_ROUNDS: usize = 24;
 /// Rounds of the alternation after a mending.
 const SHORT_ALTERNATION: usize = 4;
+/// A round of weighing seams that lowers the worst excess by less than this share is followed by
+/// changes of the molds.
+const WEIGHING_STALL: f64 = 0.1;
 /// First numbers of molds, in units of the square root of the number of panels.
-const STARTS: [f64; 4] = [1.0, 2.0, 4.0, 8.0];
+const STARTS: [f64; 6] = [0.1, 0.3, 0.6, 1.2, 3.0, 8.0];
 
 /// The cheapest paneling found with every seam within `bounds`, using only `types`; `options`
 /// gives everything but the number and type of the molds. If no try is within the bounds, the one
@@ -152,6 +155,7 @@ impl Search<'_> {
         let mut weights = vec![1.0; self.scaled.seams.len()];
         let mut fit_history = fit.alternate(&self.scaled, options.rounds);
         let mut best: Option<(f64, Fit, Vec<f64>)> = None;
+        let mut last_excess = f64::INFINITY;
         for round in 0..=MENDING_ROUNDS {
             *attempts += 1;
             let seam = options.seam_settings();
@@ -168,10 +172,16 @@ impl Search<'_> {
             if excess <= 1.0 || round == MENDING_ROUNDS || self.cost(&fit) >= limit {
                 break;
             }
-            if !self.mend(&mut fit, &measures, features, &mut weights) {
-                break;
+            self.weigh(&measures, &mut weights);
+            if excess > (1.0 - WEIGHING_STALL) * last_excess || options.seam_steps == 0 {
+                if !self.mend(&mut fit, &measures, features) {
+                    break;
+                }
+                fit_history.extend(fit.alternate(&self.scaled, SHORT_ALTERNATION));
+                last_excess = f64::INFINITY;
+            } else {
+                last_excess = excess;
             }
-            fit_history.extend(fit.alternate(&self.scaled, SHORT_ALTERNATION));
         }
         let (worst_excess, fit, seam_history) = best.unwrap_or((f64::INFINITY, fit, Vec::new()));
         let cost = self.cost(&fit);
@@ -223,21 +233,22 @@ impl Search<'_> {
         2.0 * self.bounds.excess(kink, gap)
     }
 
-    /// Gives molds at seams beyond the bounds a more general type or splits them; false if
-    /// nothing could be changed.
-    fn mend(
-        &self,
-        fit: &mut Fit,
-        measures: &Measures,
-        features: &[Feature],
-        weights: &mut [f64],
-    ) -> bool {
-        let mut faulty = vec![false; fit.molds.len()];
-        for (s, seam) in measures.seams.iter().enumerate() {
+    /// Raises the weights of seams that are near or beyond the bounds.
+    fn weigh(&self, measures: &Measures, weights: &mut [f64]) {
+        for (weight, seam) in weights.iter_mut().zip(&measures.seams) {
             let excess = self.bounds.excess(seam.max_kink(), seam.max_gap());
             if excess > 0.9 {
-                weights[s] = (weights[s] * (excess / 0.9).powi(2)).min(100.0);
+                *weight = (*weight * (excess / 0.9).powi(2)).min(100.0);
             }
+        }
+    }
+
+    /// Gives molds at seams beyond the bounds a more general type or splits them; false if
+    /// nothing could be changed.
+    fn mend(&self, fit: &mut Fit, measures: &Measures, features: &[Feature]) -> bool {
+        let mut faulty = vec![false; fit.molds.len()];
+        for seam in &measures.seams {
+            let excess = self.bounds.excess(seam.max_kink(), seam.max_gap());
             if excess > 1.0 {
                 let [a, b] = seam.panels;
                 let worse =

@@ -38,6 +38,102 @@ fn surfaces_of_one_shape_need_one_mold_and_have_no_kinks() {
     }
 }
 
+/// A circular arc from angle `a` to `b` as a quadratic: points with their weights.
+fn arc(radius: f64, a: f64, b: f64) -> [([f64; 2], f64); 3] {
+    let (middle, half) = (0.5 * (a + b), 0.5 * (b - a));
+    let on = |angle: f64, r: f64| [r * angle.cos(), r * angle.sin()];
+    let w = half.cos();
+    [(on(a, radius), 1.0), (on(middle, radius / w), w), (on(b, radius), 1.0)]
+}
+
+/// A patch of a torus, exact as a rational biquadratic, between two latitudes of the tube; turned
+/// and moved in space.
+fn torus_patch(big: f64, small: f64, latitudes: [f64; 2]) -> BsplineSurface {
+    use bspline::{Degree, KnotVector};
+    let turn = glam::DQuat::from_axis_angle(DVec3::new(0.3, -0.5, 0.8).normalize(), 0.9);
+    let knots = KnotVector::clamped_uniform(Degree::new(2).unwrap(), 3).unwrap();
+    let (mut points, mut weights) = (Vec::new(), Vec::new());
+    for ([x, y], w) in arc(1.0, 0.2, 1.1) {
+        for ([away, height], v) in arc(small, latitudes[0], latitudes[1]) {
+            // The tube's control point has been divided by its weight already.
+            let away = big + away;
+            points.push(turn * DVec3::new(away * x, away * y, height) + DVec3::new(5.0, -3.0, 2.0));
+            weights.push(w * v);
+        }
+    }
+    BsplineSurface::new(knots.clone(), knots, points, Some(weights)).unwrap()
+}
+
+#[test]
+fn torus_molds_fit_every_patch_of_a_torus() {
+    use std::f64::consts::{FRAC_PI_2, PI};
+    // Outer equator, between, across the top circle where K = 0, inner side, across the lowest one.
+    let middles = [0.0, 0.7, FRAC_PI_2, 2.4, PI, -FRAC_PI_2];
+    for (big, small) in [(3.0, 1.0), (1.3, 1.0)] {
+        for middle in middles {
+            let surface = torus_patch(big, small, [middle - 0.4, middle + 0.4]);
+            for (pattern, molds) in [(Pattern::Quad, 1), (Pattern::Quad, 4), (Pattern::Hexagon, 1)]
+            {
+                let set = panels(&surface, pattern, 6, 5);
+                let result = panel(&set, &with_type(molds, MoldType::Torus)).unwrap();
+                let (kinks, gaps) = (result.measures.kinks, result.measures.gaps);
+                let case = format!("{big} {small} at {middle}, {molds} molds: {kinks:?} {gaps:?}");
+                assert!(kinks.max < 1e-6 && gaps.max < 1e-7 * set.diagonal(), "{case}");
+                let [k1, k2, g, ..] = result.molds[0].parameters;
+                assert_close((1.0 / k2).abs(), small, 1e-4);
+                // From the axis of the torus to the middle of its tube.
+                let to_axis = (1.0 - k1 / k2) / k1.hypot(g);
+                assert_close(to_axis.abs(), big, 1e-3 * big);
+            }
+        }
+    }
+}
+
+#[test]
+fn cylinders_and_paraboloids_are_fitted_exactly() {
+    use bspline::{Degree, KnotVector};
+    let knots = |d, n| KnotVector::clamped_uniform(Degree::new(d).unwrap(), n).unwrap();
+    let (mut points, mut weights) = (Vec::new(), Vec::new());
+    for ([x, z], w) in arc(2.0, 0.1, 1.3) {
+        points.extend([-1.0, 2.0].map(|y| DVec3::new(x, y, z)));
+        weights.extend([w, w]);
+    }
+    let cylinder = BsplineSurface::new(knots(2, 3), knots(1, 2), points, Some(weights)).unwrap();
+    // z = a x² + b y² over [-s, s]²: one panel about the vertex, whose frame is that of the mold.
+    let (a, b, s) = (0.4, -0.7, 0.5);
+    let bezier = |k: f64| [k * s * s, -k * s * s, k * s * s];
+    let points = (0..9).map(|i| {
+        let (u, v) = (i / 3, i % 3);
+        let at = |k: usize| s * (k as f64 - 1.0);
+        DVec3::new(at(u), at(v), bezier(a)[u] + bezier(b)[v])
+    });
+    let paraboloid = BsplineSurface::new(knots(2, 3), knots(2, 3), points.collect(), None).unwrap();
+    let cases = [
+        (cylinder, MoldType::Cylinder, 5, 4),
+        (paraboloid.clone(), MoldType::Paraboloid, 1, 1),
+        (paraboloid, MoldType::Cubic, 1, 1),
+    ];
+    for (surface, kind, u, v) in cases {
+        let set = panels(&surface, Pattern::Quad, u, v);
+        let result = panel(&set, &with_type(1, kind)).unwrap();
+        assert_close(result.measures.kinks.max, 0.0, 1e-9);
+        assert_close(result.measures.max_deviation() / set.diagonal(), 0.0, 1e-10);
+    }
+}
+
+#[test]
+fn molds_stay_about_three_panels_wide() {
+    let set = roof(20);
+    let result = panel(&set, &Options::with_molds(20)).unwrap();
+    let table = result.table(&set);
+    let breadth = |row: &paneling::PanelRow| row.extent[1] - row.extent[0];
+    let widest = table.iter().map(breadth).fold(0.0, f64::max);
+    for row in &table {
+        let [x0, x1, y0, y1] = row.extent;
+        assert!(x1.max(-x0).max(y1).max(-y0) < 1.8 * widest, "{row:?}");
+    }
+}
+
 #[test]
 fn every_pattern_can_be_panelled_on_open_and_closed_surfaces() {
     for surface in [Shape::Saddle.surface(10, 10, 4, 4), Shape::Tube.surface(14, 12, 4, 4)] {
