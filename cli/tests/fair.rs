@@ -81,7 +81,12 @@ fn bad_expressions_are_refused_with_their_position() {
     refused(&[THETA, "--energy", "bending +"], &["position"]);
     refused(&[THETA, "--energy", "bending + bendng"], &["position 10", "bendng"]);
     refused(&[THETA, "--energy", "0*bending"], &["energy"]);
+    refused(&[THETA, "--energy", "bending*(2"], &["position 8", "expected a number"]);
     refused(&[THETA, "--energy", "area"], &["area", "size"]);
+    refused(&[THETA, "--energy", "mean_curvature"], &["mean_curvature", "size"]);
+    let torus = "fixtures/quads/torus-thin.obj";
+    refused(&[THETA, "--family", torus], &["mesh 1 of the family", "other faces"]);
+    refused(&[THETA, "--family", THETA, "--clamp-boundary"], &["--family", "--clamp-boundary"]);
 }
 
 #[test]
@@ -94,6 +99,21 @@ fn bad_meshes_are_refused() {
     let fan = "v 0 0 0\nv 0 0 1\nv 1 0 0\nv 1 0 1\nv 0 1 0\nv 0 1 1\nv -1 0 0\nv -1 0 1\n";
     let fan = obj("fan.obj", &format!("{fan}f 1 2 4 3\nf 2 1 5 6\nf 1 2 8 7\n"));
     refused(&[&fan], &["edge"]);
+    let flipped = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nv 2 0 0\nv 2 1 0\nf 1 2 3 4\nf 2 3 6 5\n";
+    refused(&[&obj("flipped.obj", flipped)], &["faces 0 and 1", "flip one of them"]);
+    let square = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\n";
+    refused(
+        &[&obj("loose.obj", &format!("{square}v 5 5 5\nf 1 2 3 4\n"))],
+        &["vertex 4 belongs to no face", "remove it"],
+    );
+    let second = "v 5 0 0\nv 6 0 0\nv 6 1 0\nv 5 1 0\n";
+    refused(
+        &[&obj("two.obj", &format!("{square}{second}f 1 2 3 4\nf 5 6 7 8\n"))],
+        &["2 separate parts"],
+    );
+    let all = written(folder.path(), "all.ron", "(vertices: [0, 1, 2, 3])");
+    let one = obj("one.obj", &format!("{square}f 1 2 3 4\n"));
+    refused(&[&one, "--fix", &all], &["all 4 vertices are fixed", "free some"]);
     let points = obj("p.obj", "v 0 0 0\nv 1 0 0\nv 1 1 0\n");
     refused(&[&points], &["no mesh"]);
     let flat = "v 0 0 0\nv 0 0 0\nv 0 0 0\nv 0 0 0\nf 1 2 3 4\n";
@@ -111,4 +131,71 @@ fn bad_options_are_refused() {
     refused(&[THETA, "--fix", &unknown], &["vertexes"]);
     refused(&[THETA, "--symmetry", "no-such-file.ron"], &["no-such-file.ron"]);
     refused(&[THETA, "--method", "magic"], &["magic"]);
+}
+
+#[test]
+fn a_flat_sheet_is_fair_already() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let mut text = String::new();
+    for k in 0..25 {
+        text += &format!("v {} {} 0\n", k % 5, k / 5);
+    }
+    for k in (0..19).filter(|k| k % 5 != 4) {
+        text += &format!("f {} {} {} {}\n", k + 1, k + 2, k + 7, k + 6);
+    }
+    let sheet = written(folder.path(), "sheet.obj", &text);
+    let (out, json) =
+        (folder.path().join("out.obj"), folder.path().join("m.json").display().to_string());
+    let out = out.display().to_string();
+    let result = umbilic(&["fair", &sheet, "-o", &out, "--levels", "0", "--metrics", &json]);
+    assert!(result.status.success(), "{}", String::from_utf8_lossy(&result.stderr));
+    let text = fs::read_to_string(&json).expect("a metrics file");
+    let m: serde_json::Value = serde_json::from_str(&text).expect("JSON");
+    assert_eq!((&m["status"], &m["iterations"]), (&"converged".into(), &0.into()));
+    assert_eq!(m["metrics"]["quadrature_gap"].as_f64(), Some(0.0));
+}
+
+#[test]
+fn quad_files_of_any_format_are_analysed_as_subdivision_surfaces() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = |name: &str| folder.path().join(name).display().to_string();
+    let ply = path("clifford.ply");
+    let result = umbilic(&["convert", "fixtures/quads/clifford.obj", &ply]);
+    assert!(result.status.success(), "{}", String::from_utf8_lossy(&result.stderr));
+    let obj = fs::read_to_string(
+        Path::new(env!("CARGO_MANIFEST_DIR")).join("../fixtures/quads/clifford.obj"),
+    )
+    .expect("a fixture");
+    let mut off = String::from("OFF\n192 192 0\n");
+    for line in obj.lines() {
+        let mut words = line.split_whitespace();
+        match words.next() {
+            Some("v") => off += &format!("{}\n", words.collect::<Vec<_>>().join(" ")),
+            Some("f") => {
+                let corners = words.map(|w| w.parse::<usize>().expect("an index") - 1);
+                let corners: Vec<String> = corners.map(|c| c.to_string()).collect();
+                off += &format!("4 {}\n", corners.join(" "));
+            }
+            _ => {}
+        }
+    }
+    let off = written(folder.path(), "clifford.off", &off);
+    for file in ["fixtures/quads/clifford.obj", &ply, &off] {
+        let json = path("m.json");
+        let result = umbilic(&["analyze", file, "--discrete-bending", "--metrics", &json]);
+        assert!(result.status.success(), "{}", String::from_utf8_lossy(&result.stderr));
+        let text = fs::read_to_string(&json).expect("a metrics file");
+        let m: serde_json::Value = serde_json::from_str(&text).expect("JSON");
+        let metrics = &m["metrics"];
+        assert_eq!(metrics["kind"], "subdivision_surface", "{file}");
+        let bending = metrics["energies"]["bending"].as_f64().expect("an energy");
+        assert!((bending - 78.957).abs() < 0.1, "{file}: {bending}");
+        let discrete = metrics["discrete_bending"].as_f64().expect("an energy");
+        assert!((discrete - 79.18).abs() < 0.1, "{file}: {discrete}");
+        assert!(metrics["gauss_bonnet_residual"].as_f64().expect("a residual") < 2e-4);
+        assert!(metrics["principal_curvature_mean_abs"].is_f64(), "{text}");
+    }
+    let result = umbilic(&["analyze", "fixtures/roof.ron", "--discrete-bending"]);
+    assert_eq!(result.status.code(), Some(2));
+    assert!(String::from_utf8_lossy(&result.stderr).contains("needs a mesh"));
 }

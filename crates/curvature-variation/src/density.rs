@@ -28,6 +28,9 @@ pub(crate) struct Density {
     pub(crate) root_epsilon: f64,
     /// Of `|l q − m²|`, in energy passes only.
     pub(crate) absolute: f64,
+    /// Of `1/J²`, `J` the area element: a barrier against parameter lines that run into one
+    /// another, see `Level::set_barrier`.
+    pub(crate) barrier: f64,
 }
 
 impl Density {
@@ -43,8 +46,9 @@ impl Density {
             root,
             root_epsilon: _,
             absolute: _,
+            barrier,
         } = *self;
-        [mean, square, product, twist, f1, f3, coupling, root].iter().all(|&c| c == 0.0)
+        [mean, square, product, twist, f1, f3, coupling, root, barrier].iter().all(|&c| c == 0.0)
     }
 
     /// `self + factor · other`.
@@ -60,6 +64,7 @@ impl Density {
             root: self.root + factor * other.root,
             root_epsilon: self.root_epsilon.max(other.root_epsilon),
             absolute: self.absolute + factor * other.absolute,
+            barrier: self.barrier + factor * other.barrier,
         }
     }
 }
@@ -297,12 +302,18 @@ impl<S: Simd> Shape<S> {
             qb = qb - halfb * 0.5 + guard * q;
             mb = mb + (sinb * half - cosb * m + sizeb * m) * 2.0 + guard * m * 2.0;
         }
+        let (mut value, mut area) = (e * j, e);
+        if w.barrier != 0.0 {
+            let barrier = self.inv_area * w.barrier;
+            value = value + barrier;
+            area = area - barrier * self.inv_area;
+        }
         let adjoint = FrameAdjoint {
             harmonics: harmonics.map(|x| x * j),
             second: [lb * j, mb * j, qb * j],
-            area: e,
+            area,
         };
-        (e * j, adjoint)
+        (value, adjoint)
     }
 
     /// Adjoints of the area element by `S_u` and `S_v`.

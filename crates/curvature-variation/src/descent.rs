@@ -30,6 +30,8 @@ const DAMPING: f64 = 1e-3;
 const REFRESH: usize = 40;
 /// Steps L-BFGS remembers.
 const MEMORY: usize = 20;
+/// Share of the energy that the barrier costs on an evenly parametrised surface.
+const BARRIER: f64 = 1e-4;
 
 /// State of the descent on one level.
 pub(crate) struct Level<'a> {
@@ -41,6 +43,8 @@ pub(crate) struct Level<'a> {
     pub(crate) rows: Vec<LinearRow>,
     /// Whether the surface may be scaled.
     pub(crate) scale_free: bool,
+    /// Coefficient of the barrier against colliding parameter lines.
+    pub(crate) barrier: f64,
     pub(crate) y: Vec<f64>,
     pub(crate) x: Vec<f64>,
     pub(crate) work: Workspace,
@@ -153,8 +157,10 @@ impl Level<'_> {
     fn value(&mut self, epsilon_area: f64, gradient: &mut [f64]) -> f64 {
         self.freedom.expand(&self.y, &mut self.x);
         let mut full = vec![0.0; self.x.len()];
-        let value = self.evaluator.gradient(
-            self.energy,
+        let mut coefficients = self.energy.coefficients();
+        coefficients.plain.barrier = self.barrier;
+        let value = self.evaluator.gradient_of(
+            coefficients,
             &self.x,
             Some(epsilon_area),
             &mut self.work,
@@ -172,6 +178,23 @@ impl Level<'_> {
                 self.y.iter_mut().for_each(|y| *y *= scale);
             }
         }
+    }
+
+    /// Weighs the barrier `BARRIER |E| · mean of Ā/J`, with the area element `J` and its mean `Ā`.
+    ///
+    /// Energies of second order do not feel how the surface is parametrised, and their minimisers
+    /// let rows of vertices run into one another between the quadrature points. Third-order
+    /// energies count the jumps of the splines' third derivatives, which hold the rows apart.
+    fn set_barrier(&mut self) {
+        let coefficients = self.energy.coefficients();
+        let third = coefficients.plain.root != 0.0 || !coefficients.scaled.is_zero();
+        if third {
+            return;
+        }
+        let area = self.area();
+        let energy = self.evaluator.energy(self.energy, &self.x, &mut self.work);
+        let patches = self.evaluator.weighted_patches();
+        self.barrier = BARRIER * energy.abs() * area / (patches * patches);
     }
 
     /// The linear conditions, and the gradient of the area where the scale is free: a step along
@@ -251,6 +274,7 @@ impl Level<'_> {
         while total.iterations < iterations && total.status != Status::Interrupted {
             let left = iterations - total.iterations;
             self.renormalise();
+            self.set_barrier();
             let (steps, memory) = match method {
                 Method::LaggedGaussNewton | Method::GaussNewton => {
                     total.factorizations += self.factor(true, DAMPING)?;
@@ -341,6 +365,7 @@ impl Level<'_> {
         let mut damping = 10.0 * DAMPING;
         for _ in 0..steps {
             self.renormalise();
+            self.set_barrier();
             let epsilon_area = self.area();
             let energy = self.value(epsilon_area, &mut gradient);
             total.history.push(energy);

@@ -142,6 +142,10 @@ impl Parser<'_> {
         }
         let digits: String = self.chars[start..self.at].iter().collect();
         match digits.parse::<f64>() {
+            _ if digits.is_empty() => {
+                let found = self.peek().map_or("the end".to_owned(), |c| format!("'{c}'"));
+                self.fail(format!("found {found}, expected a number"))
+            }
             Ok(number) if number.is_finite() => Ok(number),
             _ => {
                 self.at = start;

@@ -98,6 +98,10 @@ pub enum FairError {
     )]
     Unbounded { energy: String, value: f64 },
     #[error(
+        "{energy} has no minimum here: the surface tore while it was minimised; add bending or fix more vertices"
+    )]
+    Torn { energy: String },
+    #[error(
         "--levels {levels} would make about {vertices} vertices; at most {limit} are supported"
     )]
     TooManyLevels { levels: usize, vertices: usize, limit: usize },
@@ -416,6 +420,7 @@ fn minimise_level(
         metric,
         rows,
         scale_free,
+        barrier: 0.0,
         y: freedom.restrict(&x),
         x,
         work: Workspace::default(),
@@ -433,7 +438,14 @@ fn minimise_level(
         newton_steps,
         options.tolerance,
         observer,
-    )?;
+    );
+    let descent = match descent {
+        // Past all damping the Hessian is no longer finite.
+        Err(SolverError::NotPositiveDefinite { .. }) => {
+            return Err(FairError::Torn { energy: options.energy.to_string() });
+        }
+        other => other?,
+    };
     freedom.expand(&state.y, &mut state.x);
     if scale_free {
         // Back to the size of the input, about the same centre.

@@ -5,7 +5,7 @@ use curvature_variation::{
 };
 use fixtures::quad_graphs;
 use geom_core::{DVec3, PolyMesh};
-use std::f64::consts::PI;
+use std::f64::consts::{PI, TAU};
 use std::ops::ControlFlow;
 use subdiv_catmull_clark::{Creases, limit_frames};
 
@@ -91,6 +91,42 @@ fn clamped_boundaries_stay() {
 }
 
 #[test]
+fn rows_of_vertices_do_not_collide_while_bending_is_minimised() {
+    // Without the barrier two rows in the middle met and the energy between the quadrature points
+    // grew to 1600.
+    let mut profile = vec![(1.6, -2.4), (1.4, -2.2), (1.2, -2.0)];
+    profile.extend((0..=12).map(|k| (1.0, -1.8 + 0.3 * f64::from(k))));
+    profile.extend([(1.2, 2.0), (1.4, 2.2), (1.6, 2.4)]);
+    let constraints = Constraints { clamp_boundary: true, ..Constraints::default() };
+    let mesh = quad_graphs::revolution(&profile, 12);
+    let report = run(&mesh, &constraints, &options("bending", 1)).report;
+    assert!(report.quadrature_gap < 1e-3, "{}", report.quadrature_gap);
+    assert!(report.energy_final < 33.3, "{}", report.energy_final);
+}
+
+#[test]
+fn area_is_minimised_where_the_boundary_holds_it() {
+    // The catenoid z = acosh(r) between two rings, found from a cylinder.
+    let height = 0.5_f64;
+    let ring = height.cosh();
+    let profile: Vec<(f64, f64)> =
+        (0..=12).map(|k| (ring, height * (f64::from(k) / 6.0 - 1.0))).collect();
+    let mesh = quad_graphs::revolution(&profile, 24);
+    let rows = profile.len();
+    let held = mesh.vertices().filter(|v| v.index() % rows == 0 || v.index() % rows == rows - 1);
+    let constraints =
+        Constraints { vertices: held.map(|v| v.0).collect(), ..Constraints::default() };
+    let result = run(&mesh, &constraints, &options("area", 0));
+    let positions = result.mesh.positions();
+    let waist = positions[rows / 2].x.hypot(positions[rows / 2].y);
+    // The rings of 24 control points stand for circles 1.1 % smaller.
+    assert!((waist - 1.0).abs() < 0.02, "{waist}");
+    let area = TAU * (height + 0.5 * (2.0 * height).sinh());
+    let got = result.report.energy_final;
+    assert!((0.97..1.0).contains(&(got / area)), "{got} against {area}");
+}
+
+#[test]
 fn pinned_limit_points_and_tangent_planes_are_met() {
     let mesh = quad_graphs::ellipsoid(3, DVec3::new(1.0, 1.2, 1.4));
     let constraints = Constraints {
@@ -135,4 +171,25 @@ fn refusals_say_what_and_how_to_mend() {
         refusal(&mesh, &none, &options("bending", 12)),
         FairError::TooManyLevels { .. }
     ));
+    let mut positions = mesh.positions().to_vec();
+    let mut faces: Vec<Vec<u32>> =
+        mesh.faces().map(|f| mesh.face_vertices(f).map(|v| v.0).collect()).collect();
+    positions.push(DVec3::splat(9.0));
+    let loose = PolyMesh::new(positions.clone(), &faces).expect("a mesh and a point");
+    let error = refusal(&loose, &none, &options("bending", 0));
+    assert_eq!(error.to_string(), "vertex 22 belongs to no face; remove it");
+    positions.pop();
+    let count = positions.len() as u32;
+    positions.extend(mesh.positions().iter().map(|p| *p + 9.0 * DVec3::X));
+    let copies: Vec<Vec<u32>> =
+        faces.iter().map(|f| f.iter().map(|v| v + count).collect()).collect();
+    faces.extend(copies);
+    let two = PolyMesh::new(positions, &faces).expect("two meshes");
+    let error = refusal(&two, &none, &options("bending", 0));
+    assert_eq!(error.to_string(), "the mesh has 2 separate parts; fair each of them on its own");
+    // Its first variation is K, so that a clamped tube tears.
+    let tube = quad_graphs::lamp_shade(12);
+    let clamped = Constraints { clamp_boundary: true, ..Constraints::default() };
+    let error = refusal(&tube, &clamped, &options("mean_curvature", 0)).to_string();
+    assert!(error.starts_with("mean_curvature has no minimum"), "{error}");
 }
