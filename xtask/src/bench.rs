@@ -1,9 +1,10 @@
 //! `cargo xtask bench`: run the benches and write down what they measured.
 
-use crate::shell::{Outcome, cargo, check, read, root, write};
+use crate::shell::{Outcome, cargo, check, read, root, target, write};
 use serde_json::Value;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
+use std::process::Command;
 
 const BEGIN: &str = "<!-- measured: begin -->";
 const END: &str = "<!-- measured: end -->";
@@ -27,9 +28,10 @@ pub(crate) fn run(packages: &[&str]) -> Outcome {
 
 /// Runs the solver on the public test sets and writes the table to `docs/solver-proof.md`.
 pub(crate) fn proof() -> Outcome {
-    let machine = machine();
-    let mut run = cargo(&["run", "--release", "--quiet", "--package", "gp-solver"]);
-    run.args(["--example", "proof", "--", &machine]);
+    // With the features of the whole workspace, so that no dependency is compiled twice.
+    check(cargo(&["build", "--release", "--workspace", "--example", "proof", "--quiet"]))?;
+    let mut run = Command::new(target().join("release/examples/proof"));
+    run.current_dir(root()).arg(machine());
     let output = run.output().map_err(|e| format!("the proof could not start: {e}"))?;
     if !output.status.success() {
         let said = String::from_utf8_lossy(&output.stderr);
