@@ -58,7 +58,7 @@ pub use least_squares::{
     Checkpoint, Iteration, StepModel, System, resume_system, solve, solve_observed, solve_system,
 };
 pub use line_search::LineSearch;
-pub use linear::{BandCholesky, SparseCholesky, SymmetricPattern};
+pub use linear::{BandCholesky, MultifrontalCholesky, SparseCholesky, SymmetricPattern};
 pub use min_norm::{MinNormProjection, ProjectionOptions, ProjectionReport};
 pub use options::{Factorization, Method, Options};
 pub use problem::{Elements, EnergyBlock, Problem, Quantity, ResidualBlock};

@@ -23,13 +23,17 @@ pub enum Method {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Factorization {
-    /// Band or sparse, whichever the structure makes cheaper.
+    /// Nested dissection if the problem has [runs](crate::Problem::set_runs), else band or sparse,
+    /// whichever the structure makes cheaper.
     #[default]
     Auto,
     /// Our band Cholesky, in the caller's order or reverse Cuthill-McKee.
     Band,
     /// faer's supernodal Cholesky in approximate minimum degree order.
     Sparse,
+    /// Our multifrontal Cholesky in nested dissection order; needs
+    /// [runs](crate::Problem::set_runs), else as `Auto`.
+    Dissection,
 }
 
 /// Settings of a least-squares solve. The defaults suit every problem of the published test sets

@@ -237,6 +237,7 @@ pub struct Problem<'a> {
     pub(crate) fixed: Vec<bool>,
     pub(crate) scale: Vec<f64>,
     pub(crate) order: Option<Vec<usize>>,
+    pub(crate) run: Option<usize>,
 }
 
 impl<'a> Problem<'a> {
@@ -249,6 +250,7 @@ impl<'a> Problem<'a> {
             fixed: vec![false; unknowns],
             scale: vec![1.0; unknowns],
             order: None,
+            run: None,
         }
     }
 
@@ -301,6 +303,18 @@ impl<'a> Problem<'a> {
     /// `k`-th. Matters for band matrices: let the shorter side of a control net run fastest.
     pub fn set_order(&mut self, order: Vec<usize>) -> &mut Self {
         self.order = Some(order);
+        self
+    }
+
+    /// Says that unknowns come in runs of `length`, such as the coordinates of the vertices of a
+    /// mesh: large systems are then factored by nested dissection of these runs. An
+    /// [order](Self::set_order) of the caller's goes first.
+    ///
+    /// # Panics
+    /// If `length` is zero.
+    pub fn set_runs(&mut self, length: usize) -> &mut Self {
+        assert!(length > 0, "a run has at least one unknown");
+        self.run = Some(length);
         self
     }
 

@@ -179,7 +179,12 @@ impl NormalPlan {
         let mut variable = natural;
         let mut blocks = blocks_at(&variable);
         let cliques = blocks.iter().flat_map(|b| (0..b.len()).map(|e| b.positions(e)));
-        let (factor, order) = Factor::choose(variable.len(), cliques, wanted)?;
+        // Fixed unknowns leave gaps in the numbers of the runs, which does no harm.
+        let together: Option<Vec<usize>> = match (&problem.order, problem.run) {
+            (None, Some(run)) => Some(variable.iter().map(|i| i / run).collect()),
+            _ => None,
+        };
+        let (factor, order) = Factor::choose(variable.len(), cliques, together.as_deref(), wanted)?;
         if let Some(order) = order {
             variable = order.iter().map(|&k| variable[k]).collect();
             blocks = blocks_at(&variable);

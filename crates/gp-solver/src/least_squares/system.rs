@@ -4,7 +4,7 @@ use std::time::Instant;
 
 use super::normal::{NormalPlan, Scratch, is_constant};
 use crate::error::SolverError;
-use crate::linear::Factor;
+use crate::linear::{Factor, SymmetricPattern};
 use crate::options::Factorization;
 use crate::problem::{Block, Problem, Quantity};
 use crate::report::{Term, Timings};
@@ -132,7 +132,7 @@ impl<'a> System<'a> {
         self.problem.blocks.iter().zip(&self.values).map(rows).sum()
     }
 
-    /// The factorisation in use: `band` or `sparse`.
+    /// The factorisation in use: `band`, `sparse` or `dissection`.
     #[must_use]
     pub fn factorization(&self) -> &'static str {
         self.factor.name()
@@ -447,6 +447,13 @@ impl<'a> System<'a> {
             out[i * n + j] = value;
             out[j * n + i] = value;
         };
+        let mut columns = |pattern: &SymmetricPattern| {
+            for j in 0..n {
+                for k in pattern.column_starts()[j]..pattern.column_starts()[j + 1] {
+                    put(pattern.rows()[k], j, self.matrix[k]);
+                }
+            }
+        };
         match &self.factor {
             Factor::Band(band) => {
                 for j in 0..n {
@@ -455,14 +462,8 @@ impl<'a> System<'a> {
                     }
                 }
             }
-            Factor::Sparse { cholesky, .. } => {
-                let pattern = cholesky.pattern();
-                for j in 0..n {
-                    for k in pattern.column_starts()[j]..pattern.column_starts()[j + 1] {
-                        put(pattern.rows()[k], j, self.matrix[k]);
-                    }
-                }
-            }
+            Factor::Sparse { cholesky, .. } => columns(cholesky.pattern()),
+            Factor::Dissected { cholesky, .. } => columns(cholesky.pattern()),
         }
         out
     }

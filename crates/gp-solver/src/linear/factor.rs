@@ -1,7 +1,7 @@
-//! One interface to the two factorisations, and the choice between them.
+//! One interface to the three factorisations, and the choice between them.
 
 use super::ordering::{half_bandwidth, reverse_cuthill_mckee};
-use super::{BandCholesky, SparseCholesky, SymmetricPattern};
+use super::{BandCholesky, MultifrontalCholesky, SparseCholesky, SymmetricPattern};
 use crate::error::SolverError;
 use crate::options::Factorization;
 
@@ -21,6 +21,7 @@ const SMALL: usize = 64;
 pub(crate) enum Factor {
     Band(BandCholesky),
     Sparse { cholesky: Box<SparseCholesky>, shifted: Vec<f64> },
+    Dissected { cholesky: Box<MultifrontalCholesky>, shifted: Vec<f64> },
 }
 
 /// Where the values of the normal matrix stand.
@@ -32,12 +33,22 @@ pub(crate) enum Storage<'a> {
 impl Factor {
     /// Chooses a factorisation for the pattern whose cliques are `groups` (positions in the
     /// natural order, each sorted). Returns it with the order to use: `order[k]` is the natural
-    /// position that comes `k`-th, or `None` for the natural order.
+    /// position that comes `k`-th, or `None` for the natural order. `together` numbers the positions
+    /// that belong together, if the problem does.
     pub(crate) fn choose<'a>(
         size: usize,
         groups: impl Iterator<Item = &'a [u32]> + Clone,
+        together: Option<&[usize]>,
         wanted: Factorization,
     ) -> Result<(Self, Option<Vec<usize>>), SolverError> {
+        if let Some(together) = together
+            && (wanted == Factorization::Dissection
+                || wanted == Factorization::Auto && size > SMALL)
+        {
+            let pattern = SymmetricPattern::from_cliques(size, groups);
+            let cholesky = Box::new(MultifrontalCholesky::new(pattern, together)?);
+            return Ok((Self::Dissected { cholesky, shifted: Vec::new() }, None));
+        }
         let span = |g: &[u32]| g.last().zip(g.first()).map_or(0, |(b, a)| (b - a) as usize);
         let natural_kd = groups.clone().map(span).max().unwrap_or(0);
         if size <= SMALL && wanted != Factorization::Sparse {
@@ -78,6 +89,7 @@ impl Factor {
         match self {
             Self::Band(band) => Storage::Band { stride: band.slot(0, 1) },
             Self::Sparse { cholesky, .. } => Storage::Columns(cholesky.pattern()),
+            Self::Dissected { cholesky, .. } => Storage::Columns(cholesky.pattern()),
         }
     }
 
@@ -85,6 +97,7 @@ impl Factor {
         match self {
             Self::Band(band) => band.values_len(),
             Self::Sparse { cholesky, .. } => cholesky.pattern().len(),
+            Self::Dissected { cholesky, .. } => cholesky.pattern().len(),
         }
     }
 
@@ -93,6 +106,7 @@ impl Factor {
         match self {
             Self::Band(band) => band.slot(i, i),
             Self::Sparse { cholesky, .. } => cholesky.pattern().column_starts()[i],
+            Self::Dissected { cholesky, .. } => cholesky.pattern().column_starts()[i],
         }
     }
 
@@ -101,12 +115,11 @@ impl Factor {
         match self {
             Self::Band(band) => band.factor(values, shift),
             Self::Sparse { cholesky, shifted } => {
-                shifted.clear();
-                shifted.extend_from_slice(values);
-                let starts = cholesky.pattern().column_starts();
-                for (i, &s) in shift.iter().enumerate() {
-                    shifted[starts[i]] += s;
-                }
+                add_to_diagonal(cholesky.pattern(), values, shift, shifted);
+                cholesky.factor(shifted)
+            }
+            Self::Dissected { cholesky, shifted } => {
+                add_to_diagonal(cholesky.pattern(), values, shift, shifted);
                 cholesky.factor(shifted)
             }
         }
@@ -116,6 +129,7 @@ impl Factor {
         match self {
             Self::Band(band) => band.solve_in_place(rhs),
             Self::Sparse { cholesky, .. } => cholesky.solve_in_place(rhs),
+            Self::Dissected { cholesky, .. } => cholesky.solve_in_place(rhs),
         }
     }
 
@@ -123,6 +137,21 @@ impl Factor {
         match self {
             Self::Band(_) => "band",
             Self::Sparse { .. } => "sparse",
+            Self::Dissected { .. } => "dissection",
         }
+    }
+}
+
+/// `shifted = A + diag(shift)`.
+fn add_to_diagonal(
+    pattern: &SymmetricPattern,
+    values: &[f64],
+    shift: &[f64],
+    shifted: &mut Vec<f64>,
+) {
+    shifted.clear();
+    shifted.extend_from_slice(values);
+    for (&start, s) in pattern.column_starts().iter().zip(shift) {
+        shifted[start] += s;
     }
 }

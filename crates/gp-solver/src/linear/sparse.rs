@@ -1,4 +1,4 @@
-//! Sparse Cholesky by faer: the only module that knows it, so that it is compiled once.
+//! Sparse Cholesky by faer, which only this module and `dense` know, so that it is compiled once.
 
 use faer::dyn_stack::{MemBuffer, MemStack};
 use faer::linalg::cholesky::llt::factor::LltError;
