@@ -1,15 +1,24 @@
 //! Shortest steps onto constraints.
 
 use crate::error::SolverError;
-use crate::linear::{SparseCholesky, SymmetricPattern};
+use crate::linear::{MultifrontalCholesky, SymmetricPattern};
 use crate::problem::{Quantity, ResidualBlock};
 use crate::report::Status;
+
+/// A factorisation serves for another step if the last one left at most this share of `max |C|`.
+const KEEP: f64 = 0.1;
+/// The shift falls after a step that leaves more than this share of `max |C|`.
+const SLOW: f64 = 0.5;
+/// The shift falls no further than this.
+const LEAST_SHIFT: f64 = 1e-14;
 
 /// Settings of [`MinNormProjection::project`].
 #[derive(Clone, Debug, PartialEq)]
 pub struct ProjectionOptions {
     /// Added to the diagonal of `J S Sᵀ Jᵀ`, as a fraction of its largest entry; keeps redundant
-    /// constraints solvable.
+    /// constraints solvable. It also holds back directions in which the constraints hardly change,
+    /// so it falls to a tenth after every step that leaves more than half of `max |C|`, for as
+    /// long as the matrix can be factored.
     pub shift: f64,
     /// Converged if `max |C| ≤ tolerance`.
     pub tolerance: f64,
@@ -37,13 +46,14 @@ pub struct ProjectionReport {
 }
 
 /// Newton's method for `C(z) = 0` with steps of least `|S⁻¹ s|`:
-/// `z ← z − S Sᵀ Jᵀ (J S Sᵀ Jᵀ + shift I)⁻¹ C`, with the pattern of the matrix analysed once.
+/// `z ← z − S Sᵀ Jᵀ (J S Sᵀ Jᵀ + shift I)⁻¹ C`, with the pattern of the matrix analysed once and
+/// its factorisation kept (with its `J`) as long as every step leaves at most a tenth of `max |C|`.
 ///
 /// Made to polish a solution: constraints that least squares left at 10⁻⁶ go to rounding level,
 /// and the unknowns move no farther than they must.
 pub struct MinNormProjection {
     unknowns: usize,
-    cholesky: SparseCholesky,
+    cholesky: MultifrontalCholesky,
     /// For each unknown its (row, place in the Jacobian values), in the order of rows.
     entries: Vec<(usize, usize)>,
     starts: Vec<usize>,
@@ -53,10 +63,19 @@ pub struct MinNormProjection {
 
 impl MinNormProjection {
     /// Plans the projection onto the zero set of `constraints` in a space of `unknowns` unknowns.
+    /// Rows come in runs of `run` that concern the same thing, such as the coordinates of an edge;
+    /// nested dissection keeps them together.
     ///
     /// # Errors
-    /// [`SolverError::ColumnOutOfRange`] or out of memory.
-    pub fn new(constraints: &dyn ResidualBlock, unknowns: usize) -> Result<Self, SolverError> {
+    /// [`SolverError::ColumnOutOfRange`] or [`SolverError::TooLarge`].
+    ///
+    /// # Panics
+    /// If `run` is zero.
+    pub fn new(
+        constraints: &dyn ResidualBlock,
+        unknowns: usize,
+        run: usize,
+    ) -> Result<Self, SolverError> {
         let elements = constraints.elements();
         let mut lists = vec![Vec::new(); unknowns];
         for e in 0..elements.len() {
@@ -84,7 +103,8 @@ impl MinNormProjection {
         for list in &lists {
             starts.push(starts[starts.len() - 1] + list.len());
         }
-        let cholesky = SparseCholesky::new(pattern)?;
+        let together: Vec<usize> = (0..pattern.size()).map(|row| row / run).collect();
+        let cholesky = MultifrontalCholesky::new(pattern, &together)?;
         Ok(Self { unknowns, cholesky, entries: lists.concat(), starts, targets })
     }
 
@@ -106,6 +126,7 @@ impl MinNormProjection {
         assert!(z.len() == self.unknowns && scale.len() == self.unknowns, "one value per unknown");
         let elements = constraints.elements();
         let mut residuals = vec![0.0; elements.rows_total()];
+        let mut next_residuals = residuals.clone();
         let mut jacobian = vec![0.0; elements.jacobian_len()];
         let mut values = vec![0.0; self.cholesky.pattern().len()];
         let mut trial = z.to_vec();
@@ -113,6 +134,9 @@ impl MinNormProjection {
         let mut violation = largest(constraints.name(), &residuals)?;
         let initial_violation = violation;
         let mut iterations = 0;
+        let (mut shift, mut least_shift) = (options.shift, LEAST_SHIFT);
+        // Whether there is a factorisation, and whether it was made at `z`.
+        let (mut usable, mut fresh) = (false, false);
         let status = loop {
             if violation <= options.tolerance {
                 break Status::Converged;
@@ -120,8 +144,23 @@ impl MinNormProjection {
             if iterations >= options.max_iterations {
                 break Status::IterationLimit;
             }
-            self.fill(&jacobian, scale, options.shift, &mut values);
-            self.cholesky.factor(&values)?;
+            if !usable {
+                if !fresh && iterations > 0 {
+                    constraints.linearize(z, &mut residuals, &mut jacobian);
+                }
+                fresh = true;
+                self.fill(&jacobian, scale, shift, &mut values);
+                match self.cholesky.factor(&values) {
+                    Ok(()) => {}
+                    Err(SolverError::NotPositiveDefinite { .. }) if shift < options.shift => {
+                        // Back to the last shift that was large enough.
+                        shift *= 10.0;
+                        least_shift = shift;
+                        continue;
+                    }
+                    Err(error) => return Err(error),
+                }
+            }
             let mut multipliers = residuals.clone();
             self.cholesky.solve_in_place(&mut multipliers);
             for i in 0..self.unknowns {
@@ -129,14 +168,21 @@ impl MinNormProjection {
                 let sum: f64 = entries.iter().map(|&(r, k)| jacobian[k] * multipliers[r]).sum();
                 trial[i] = z[i] - scale[i] * scale[i] * sum;
             }
-            constraints.linearize(&trial, &mut residuals, &mut jacobian);
-            let next = largest(constraints.name(), &residuals)?;
-            if !(next < violation) {
+            constraints.residuals(&trial, &mut next_residuals);
+            let next = largest(constraints.name(), &next_residuals)?;
+            usable = next <= KEEP * violation;
+            if fresh && next > SLOW * violation {
+                shift = least_shift.max(0.1 * shift).min(shift);
+            }
+            if next < violation {
+                z.copy_from_slice(&trial);
+                std::mem::swap(&mut residuals, &mut next_residuals);
+                violation = next;
+                iterations += 1;
+                fresh = false;
+            } else if fresh {
                 break Status::Stalled;
             }
-            z.copy_from_slice(&trial);
-            violation = next;
-            iterations += 1;
         };
         Ok(ProjectionReport { status, iterations, initial_violation, final_violation: violation })
     }
@@ -193,7 +239,7 @@ mod tests {
             row.product(i, i, 1.0);
         }
         let sphere = rows.build();
-        let mut projection = MinNormProjection::new(&sphere, 3).unwrap();
+        let mut projection = MinNormProjection::new(&sphere, 3, 1).unwrap();
         let mut z = [1.02, 2.04, -2.04];
         let options = ProjectionOptions { tolerance: 1e-14, ..ProjectionOptions::default() };
         let report = projection.project(&sphere, &mut z, &[1.0; 3], &options).unwrap();

@@ -12,8 +12,11 @@ use crate::lelieuvre::signs;
 use crate::quad_distance::{Mix, QuadDistances};
 use crate::{HyperbolicNet, NetError, QuadNet, Spread, fit_shape_parameters};
 use geom_core::{ClosestPoint, DVec3};
-use gp_solver::{Factorization, Problem, QuadraticBuilder, SolverError, Status, System};
+use gp_solver::{
+    Elements, Factorization, Problem, QuadraticBuilder, ResidualBlock, SolverError, Status, System,
+};
 use std::ops::ControlFlow;
+use std::sync::{Arc, Mutex, PoisonError};
 
 /// How the planarity of vertex stars is written.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -123,14 +126,19 @@ pub fn solve_published(
     let positions =
         |x: &[f64]| -> Vec<DVec3> { (0..vertices).map(|v| layout.get(x, v) * h).collect() };
     let mut shape = Vec::new();
+    // Topology changes only once, when the frame points join: two symbolic factorisations.
+    let frame_shape = Arc::new(Mutex::new(Vec::new()));
+    let mut system = None;
     for round in 0..=options.rounds {
-        let mut problem = base_problem(net, reference, options, layout, h);
-        if round > 0 {
-            let weight = Weight::new(options.frame);
-            let quads = frame_quads(net, &shape);
-            problem.add(QuadDistances::new("frame points", layout, quads, weight));
+        if round <= 1 {
+            let mut problem = base_problem(net, reference, options, layout, h);
+            if round == 1 {
+                let shared = Arc::clone(&frame_shape);
+                problem.add(FramePoints::new(net, layout, options.frame, shared));
+            }
+            system = Some(System::new(problem, Factorization::Auto).map_err(linear)?);
         }
-        let mut system = System::new(problem, Factorization::Auto).map_err(linear)?;
+        let Some(system) = &mut system else { break };
         let mut descent = Descent {
             stage: round,
             steps: if round == 0 { options.first_steps } else { options.steps_per_round },
@@ -138,9 +146,10 @@ pub fn solve_published(
             damping: Damping::Constant(1e-3),
             observer: &mut observer,
         };
-        let end = descent.run(&mut system, &mut x, &mut history).map_err(linear)?;
+        let end = descent.run(system, &mut x, &mut history).map_err(linear)?;
         let at = positions(&x);
         shape = fit_shape_parameters(net, &at, options.spread)?.shape;
+        frame_shape.lock().unwrap_or_else(PoisonError::into_inner).clone_from(&shape);
         largest.push(kinks(net, &at, &shape).into_iter().fold(0.0, f64::max));
         if end == Status::Interrupted {
             status = end;
@@ -161,7 +170,7 @@ pub fn solve_published(
 
 /// Star planarity, fairness and proximity (ibid., Eq. 10), positions in mean edge lengths.
 fn base_problem<'a>(
-    net: &QuadNet,
+    net: &'a QuadNet,
     reference: &'a dyn ClosestPoint,
     options: &PublishedOptions,
     layout: Layout,
@@ -169,6 +178,7 @@ fn base_problem<'a>(
 ) -> Problem<'a> {
     let vertices = net.positions().len();
     let mut problem = Problem::new(layout.stride * vertices);
+    problem.set_runs(layout.stride);
     match options.planarity {
         StarPlanarity::Quads => {
             let plain = |v| [(v, 1.0), (v, 0.0)];
@@ -238,6 +248,46 @@ fn star_normals(net: &QuadNet, layout: Layout) -> gp_solver::QuadraticConstraint
         unit.constant(-1.0);
     }
     builder.build()
+}
+
+/// Distances of the diagonals of the frame points of both patches at every inner edge, with the
+/// ends of the edge (ibid., §3.2, step 3). Shape parameters are those of the last round.
+struct FramePoints<'a> {
+    net: &'a QuadNet,
+    quads: QuadDistances,
+    shape: Arc<Mutex<Vec<f64>>>,
+}
+
+impl<'a> FramePoints<'a> {
+    fn new(net: &'a QuadNet, layout: Layout, weight: f64, shape: Arc<Mutex<Vec<f64>>>) -> Self {
+        let equal = vec![1.0; net.quads().len()];
+        let quads = frame_quads(net, &equal);
+        let quads = QuadDistances::new("frame points", layout, quads, Weight::new(weight));
+        Self { net, quads, shape }
+    }
+}
+
+impl ResidualBlock for FramePoints<'_> {
+    fn name(&self) -> &str {
+        self.quads.name()
+    }
+
+    fn elements(&self) -> &Elements {
+        self.quads.elements()
+    }
+
+    fn refresh(&mut self, _: &[f64]) {
+        let shape = self.shape.lock().unwrap_or_else(PoisonError::into_inner);
+        self.quads.set_mixes(frame_quads(self.net, &shape));
+    }
+
+    fn residuals(&self, x: &[f64], residuals: &mut [f64]) {
+        self.quads.residuals(x, residuals);
+    }
+
+    fn linearize(&self, x: &[f64], residuals: &mut [f64], jacobian: &mut [f64]) {
+        self.quads.linearize(x, residuals, jacobian);
+    }
 }
 
 /// The frame points of both patches at every inner edge, with the ends of the edge.

@@ -14,6 +14,7 @@ pub(crate) type Mix = [(usize, f64); 2];
 /// midpoints. Where diagonals are parallel to within 1e-9 the row vanishes: no plane is at fault.
 pub(crate) struct QuadDistances {
     name: &'static str,
+    layout: Layout,
     elements: Elements,
     /// Per quad, how its corners are mixed from the vertices of the element.
     mixes: Vec<[[f64; 6]; 4]>,
@@ -46,7 +47,23 @@ impl QuadDistances {
             elements.push(&columns, 1);
             mixes.push(mix);
         }
-        Self { name, elements, mixes, weight }
+        Self { name, layout, elements, mixes, weight }
+    }
+
+    /// Changes how the corners are mixed; every corner keeps its vertices.
+    pub(crate) fn set_mixes(&mut self, quads: impl Iterator<Item = [Mix; 4]>) {
+        for ((e, quad), mix) in quads.enumerate().zip(&mut self.mixes) {
+            *mix = [[0.0; 6]; 4];
+            for (corner, parts) in quad.iter().enumerate() {
+                for &(v, share) in parts {
+                    let first = self.layout.column(v, 0);
+                    let columns = self.elements.columns(e).chunks_exact(3);
+                    if let Some(at) = columns.map(|c| c[0]).position(|c| c == first) {
+                        mix[corner][at] += share;
+                    }
+                }
+            }
+        }
     }
 
     fn corners(&self, e: usize, x: &[f64]) -> [DVec3; 4] {
@@ -147,6 +164,17 @@ mod tests {
                 assert!((got - want).abs() < 1e-8, "element {e}, column {c}: {got} {want}");
             }
         }
+    }
+
+    #[test]
+    fn mixes_can_change() {
+        let plain = |v| [(v, 1.0), (0, 0.0)];
+        let with =
+            |a: f64, b: f64| [plain(0), [(1, a), (2, 1.0 - a)], plain(3), [(4, b), (5, 1.0 - b)]];
+        let new = |quad| QuadDistances::new("", LAYOUT, std::iter::once(quad), Weight::new(1.0));
+        let (mut changed, want) = (new(with(0.3, 0.6)), new(with(0.8, 0.1)));
+        changed.set_mixes(std::iter::once(with(0.8, 0.1)));
+        assert_eq!(changed.corners(0, &start()), want.corners(0, &start()));
     }
 
     #[test]
