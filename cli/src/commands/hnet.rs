@@ -8,8 +8,8 @@ use crate::net_report;
 use crate::outcome::{Outcome, Status};
 use geom_core::TriMesh;
 use hyperbolic_nets::{
-    AsymptoticField, Boundary, GateReport, HyperbolicNet, JointOptions, NetMeasures, NetReport,
-    PublishedOptions, QuadNet, StepRecord,
+    AsymptoticField, Boundary, BoundaryPolygon, GateReport, HyperbolicNet, JointOptions,
+    NetMeasures, NetReport, NetWarning, PublishedOptions, QuadNet, StepRecord,
 };
 use serde::{Deserialize, Serialize};
 use std::ops::ControlFlow;
@@ -18,7 +18,7 @@ use std::path::PathBuf;
 /// Arguments of `hnet`.
 #[derive(Debug, clap::Args)]
 #[command(
-    after_help = "Example: umbilic hnet fixtures/nets/catenoid-ring.obj -o ring.step -o ring.glb -o ring.ron --metrics ring.json\n\nOutputs: ron (net file), step (exact rational patches), obj (the quads), glb (sampled, with curvatures), csv and dxf (wire positions for cutting molds)."
+    after_help = "Example: umbilic hnet fixtures/nets/catenoid-ring.obj -o ring.step -o ring.glb -o ring.ron --metrics ring.json\n\nOutputs: ron (net file), step (exact rational patches), obj (the quads), glb, ply and stl (sampled; glb with curvatures), csv and dxf (wire positions for cutting molds)."
 )]
 pub(crate) struct Hnet {
     /// Quads that follow the asymptotic directions of a negatively curved surface, or a net file
@@ -56,7 +56,7 @@ enum BoundaryChoice {
     Anchored,
     /// As the inside: near the surface
     Free,
-    /// Exactly where it starts
+    /// Where it starts, moved only if no exact net has this boundary
     Fixed,
     /// Along the boundary curve, corners held
     Glide,
@@ -115,6 +115,8 @@ struct HnetMetrics {
     deviation_mean_percent: f64,
     deviation_max_percent: f64,
     deviation_max_edges: f64,
+    /// How far boundary vertices left the boundary polygon of the input, in mean edge lengths.
+    boundary_deviation_max_edges: f64,
     asymptotic_deviation_mean_deg: f64,
     input_asymptotic_deviation_mean_deg: f64,
     negative_curvature_percent: f64,
@@ -153,7 +155,11 @@ impl Hnet {
                 measures.kinks.folds
             ));
         }
-        let metrics = metrics(&surface, &gates, &measures);
+        let moved = BoundaryPolygon::deviation(&net, surface.net()) / measures.edge_length;
+        if options.boundary == Some(BoundaryChoice::Fixed) && moved > 0.0 {
+            warnings.push(NetWarning::boundary(&net, moved).to_string());
+        }
+        let metrics = metrics(&surface, &gates, &measures, moved);
         let mut outcome = Outcome::new(net_files::status(report.status), report.iterations)
             .with_input(&self.input)
             .with_metrics(&metrics)?;
@@ -267,7 +273,12 @@ fn watch(
     if context.interrupted() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
 }
 
-fn metrics(surface: &HyperbolicNet, gates: &GateReport, measures: &NetMeasures) -> HnetMetrics {
+fn metrics(
+    surface: &HyperbolicNet,
+    gates: &GateReport,
+    measures: &NetMeasures,
+    moved: f64,
+) -> HnetMetrics {
     let [mean, max] = measures.deviation_percent();
     HnetMetrics {
         faces: surface.net().quads().len(),
@@ -288,6 +299,7 @@ fn metrics(surface: &HyperbolicNet, gates: &GateReport, measures: &NetMeasures) 
         deviation_mean_percent: mean,
         deviation_max_percent: max,
         deviation_max_edges: measures.deviation_edges()[1],
+        boundary_deviation_max_edges: moved,
         asymptotic_deviation_mean_deg: measures.misalignment.to_degrees(),
         input_asymptotic_deviation_mean_deg: gates.misalignment.to_degrees(),
         negative_curvature_percent: 100.0 * gates.negative_share,

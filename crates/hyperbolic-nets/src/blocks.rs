@@ -206,7 +206,7 @@ impl Proximity<'_> {
 }
 
 /// Nearest point of an open or closed polyline, with the unit tangent as `normal`.
-fn closest_on_polyline(points: &[DVec3], x: DVec3) -> Foot {
+pub(crate) fn closest_on_polyline(points: &[DVec3], x: DVec3) -> Foot {
     let mut best = (f64::INFINITY, Foot { point: points[0], normal: DVec3::ZERO });
     for pair in points.windows(2) {
         let point = pair[0].lerp(pair[1], closest_on_segment(x, pair[0], pair[1]));

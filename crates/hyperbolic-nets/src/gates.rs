@@ -1,7 +1,7 @@
 //! What to know about an input net before it is solved.
 
 use crate::lelieuvre::signs;
-use crate::{AsymptoticField, NetError, QuadNet};
+use crate::{AsymptoticField, BoundaryPolygon, NetError, QuadNet};
 
 /// Share of negatively curved area below which a net is refused, and below which it is warned of.
 const NEGATIVE_SHARE: [f64; 2] = [0.60, 0.95];
@@ -61,11 +61,26 @@ pub enum NetWarning {
         "{count} faces are planar (first: {first}); the surface is flat there and the net may lose its shape: use larger faces there"
     )]
     PlanarFaces { count: usize, first: usize },
+    /// A boundary polygon that an exact net near the input cannot have.
+    #[error(
+        "the boundary moves by up to {moved:.1e} edge lengths so that the net can be exact: its polygon prescribes the tangent planes along it ({angle_deg:.1} degrees off the faces in the mean) and an alternating product of {product:.3} around a loop, which must be 1; move its vertices onto a smoother curve, or let them slide along it (boundary glide)"
+    )]
+    BoundaryPrescribed { angle_deg: f64, product: f64, moved: f64 },
     /// No alternating colouring.
     #[error(
         "vertices cannot be coloured alternately around some hole (an odd number of edges leads around it): the shape parameters are unique and no common factor can be chosen"
     )]
     NotTwoColourable,
+}
+
+impl NetWarning {
+    /// Why a fixed boundary moved by `moved` edge lengths.
+    #[must_use]
+    pub fn boundary(net: &QuadNet, moved: f64) -> Self {
+        let BoundaryPolygon { closing, plane_angle } = BoundaryPolygon::new(net);
+        let (angle_deg, product) = (plane_angle.to_degrees(), closing.exp());
+        Self::BoundaryPrescribed { angle_deg, product, moved }
+    }
 }
 
 /// Measures a net; `field` belongs to its reference surface.
@@ -180,6 +195,20 @@ mod tests {
         let odd = asymptotic_nets::catenoid_odd();
         let warnings = gates(odd.positions, &odd.quads).check().unwrap();
         assert_eq!(warnings, vec![NetWarning::NotTwoColourable]);
+    }
+
+    #[test]
+    fn jittered_boundaries_prescribe_an_impossible_product() {
+        let net = |model: asymptotic_nets::AsymptoticNet| {
+            QuadNet::new(&PolyMesh::new(model.positions, &model.quads).unwrap()).unwrap()
+        };
+        // An exact asymptotic net has the product 1 by the Lelieuvre equations.
+        let exact = BoundaryPolygon::new(&net(asymptotic_nets::enneper()));
+        assert!(exact.closing < 1e-9 && exact.plane_angle.to_degrees() < 4.0, "{exact:?}");
+        let rough = BoundaryPolygon::new(&net(asymptotic_nets::enneper().jittered(0.05, 1)));
+        assert!(rough.closing > 0.1 && rough.plane_angle > exact.plane_angle, "{rough:?}");
+        let text = NetWarning::boundary(&net(asymptotic_nets::enneper()), 0.01).to_string();
+        assert!(text.contains("glide") && text.contains("1.0e-2 edge lengths"), "{text}");
     }
 
     #[test]

@@ -7,8 +7,8 @@ use crate::lelieuvre::{LelieuvreStart, NORMAL, POSITION, constraints, shape_para
 use crate::{HyperbolicNet, NetError, QuadNet, best_log_factor};
 use geom_core::{ClosestPoint, DVec3};
 use gp_solver::{
-    Factorization, MinNormProjection, Problem, ProjectionOptions, QuadraticConstraints,
-    SolverError, Status, System,
+    Factorization, MinNormProjection, Problem, ProjectionOptions, ProjectionReport,
+    QuadraticConstraints, SolverError, Status, System,
 };
 use std::ops::ControlFlow;
 
@@ -64,7 +64,7 @@ impl Default for JointOptions {
             boundary: Boundary::Anchored,
             relaxed: Vec::new(),
             relaxed_share: 0.02,
-            polish_steps: 12,
+            polish_steps: 30,
             polish_tol: 1e-13,
         }
     }
@@ -139,23 +139,23 @@ pub fn solve_joint(
         }
     }
     drop(system);
-    let mut scale = vec![size; 6 * vertices];
-    for v in 0..vertices {
-        scale[6 * v..6 * v + 3].fill(if fixed[v] { 0.0 } else { h });
-    }
     let (mut status, mut constraint_max, mut polish_steps) = (Status::Interrupted, None, 0);
     if !interrupted {
-        // Aimed below what counts as exact; round-off may end it before that.
-        let polish_options = ProjectionOptions {
-            shift: POLISH_SHIFT,
-            tolerance: 0.1 * options.polish_tol,
-            max_iterations: options.polish_steps,
+        let mut polish = Polish {
+            projection: MinNormProjection::new(&constraint_block, 6 * vertices, 3)
+                .map_err(linear)?,
+            constraints: &constraint_block,
+            fixed: &fixed,
+            sizes: [h, size],
+            options,
         };
-        let mut projection =
-            MinNormProjection::new(&constraint_block, 6 * vertices).map_err(linear)?;
-        let report = projection
-            .project(&constraint_block, &mut x, &scale, &polish_options)
-            .map_err(linear)?;
+        let before = x.clone();
+        let mut report = polish.run(&mut x, 0.0).map_err(linear)?;
+        if report.final_violation > options.polish_tol && fixed.contains(&true) {
+            // No exact net has this boundary polygon, or none that is near.
+            x = before;
+            report = polish.run(&mut x, FIXED_SHARE).map_err(linear)?;
+        }
         let exact = report.final_violation <= options.polish_tol;
         status = if exact { Status::Converged } else { Status::Stalled };
         constraint_max = Some([report.initial_violation, report.final_violation]);
@@ -183,6 +183,7 @@ fn problem<'a>(
 ) -> Problem<'a> {
     let vertices = net.positions().len();
     let mut problem = Problem::new(6 * vertices);
+    problem.set_runs(6);
     problem.add(Weighted { block: constraints.clone(), weight: constraint_weight.clone() });
     let curves = second_differences(net);
     let curves = || curves.iter().map(Vec::as_slice);
@@ -234,6 +235,37 @@ fn problem<'a>(
     }
     problem
 }
+
+/// Newton steps onto the constraints.
+struct Polish<'a> {
+    projection: MinNormProjection,
+    constraints: &'a QuadraticConstraints,
+    fixed: &'a [bool],
+    /// Mean edge length and mean length of the normals.
+    sizes: [f64; 2],
+    options: &'a JointOptions,
+}
+
+impl Polish<'_> {
+    /// Positions of fixed vertices move `willing` times as easily as others.
+    fn run(&mut self, x: &mut [f64], willing: f64) -> Result<ProjectionReport, SolverError> {
+        let [h, size] = self.sizes;
+        let mut scale = vec![size; x.len()];
+        for (v, &fixed) in self.fixed.iter().enumerate() {
+            scale[6 * v..6 * v + 3].fill(if fixed { willing * h } else { h });
+        }
+        // Aimed below what counts as exact; round-off may end it before that.
+        let options = ProjectionOptions {
+            shift: POLISH_SHIFT,
+            tolerance: 0.1 * self.options.polish_tol,
+            max_iterations: self.options.polish_steps,
+        };
+        self.projection.project(self.constraints, x, &scale, &options)
+    }
+}
+
+/// How much more reluctantly than the others fixed vertices move where they must.
+const FIXED_SHARE: f64 = 0.1;
 
 /// Shift of `J S Sᵀ Jᵀ` relative to its diagonal. Its rows depend on one another, since a net has
 /// an equation too many for every face.

@@ -49,7 +49,7 @@ mod small;
 mod transformed;
 
 pub use asymptotic_field::AsymptoticField;
-pub use boundary::Boundary;
+pub use boundary::{Boundary, BoundaryPolygon};
 pub use cage::{CageFit, Freedom, cage_corners, fit_cage};
 pub use darboux::{Branch, Cyclide, DarbouxError, DarbouxMap, ImageCircle};
 pub use descend::StepRecord;
@@ -65,4 +65,4 @@ pub use patch::{BilinearPatch, PatchJet, Quadric};
 pub use published::{FairnessOrder, PublishedOptions, StarPlanarity, solve_published};
 pub use sample::{SampledPatches, SurfaceSample};
 pub use shape::{ShapeFit, Spread, best_log_factor, fit_shape_parameters};
-pub use transformed::{CAGE_EDGES, TransformedNet, image_of_segment};
+pub use transformed::{CAGE_EDGES, TransformedNet, cage_face_lines, image_of_segment};

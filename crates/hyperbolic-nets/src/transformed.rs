@@ -174,6 +174,27 @@ pub const CAGE_EDGES: [[usize; 2]; 12] = [
     [3, 7],
 ];
 
+/// Straight lines within the faces of a box with corners as [`crate::cage_corners`] numbers them,
+/// `count` in each direction of each face: their images are circles on the spheres that the faces
+/// become.
+#[must_use]
+pub fn cage_face_lines(corners: &[DVec3; 8], count: usize) -> Vec<[DVec3; 2]> {
+    let mut lines = Vec::with_capacity(12 * count);
+    for across in 0..3 {
+        let (along, over) = (1 << ((across + 1) % 3), 1 << ((across + 2) % 3));
+        for base in [0, 1 << across] {
+            for (a, b) in [(along, over), (over, along)] {
+                for k in 1..=count {
+                    let t = k as f64 / (count + 1) as f64;
+                    let end = |from: usize| corners[from].lerp(corners[from + a], t);
+                    lines.push([end(base), end(base + b)]);
+                }
+            }
+        }
+    }
+    lines
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -188,6 +209,20 @@ mod tests {
         let net = QuadNet::new(&mesh).unwrap();
         let go_on = |_: &_| ControlFlow::Continue(());
         solve_joint(&net, &*model.surface, &JointOptions::default(), go_on).unwrap().0
+    }
+
+    #[test]
+    fn lines_of_the_cage_lie_in_its_faces() {
+        let bounds = BoundingBox { min: DVec3::ZERO, max: DVec3::new(1.0, 2.0, 3.0) };
+        let lines = cage_face_lines(&crate::cage_corners(bounds, 0.0), 2);
+        assert_eq!(lines.len(), 24);
+        for [a, b] in lines {
+            let (a, b) = ((a / bounds.max).to_array(), (b / bounds.max).to_array());
+            let same = |k: &usize| (a[*k] - b[*k]).abs() < 1e-12;
+            assert_eq!((0..3).filter(same).count(), 2, "parallel to an axis");
+            let on_face = |k: &usize| same(k) && (a[*k] < 1e-12 || a[*k] > 1.0 - 1e-12);
+            assert_eq!((0..3).filter(on_face).count(), 1, "{a:?} {b:?}");
+        }
     }
 
     #[test]

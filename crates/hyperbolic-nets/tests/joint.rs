@@ -2,9 +2,12 @@
 #![allow(clippy::unwrap_used, reason = "a test may panic")]
 
 use fixtures::asymptotic_nets::{self, AsymptoticNet};
-use geom_core::PolyMesh;
+use geom_core::{PolyMesh, TriMesh};
 use gp_solver::Status;
-use hyperbolic_nets::{JointOptions, QuadNet, distances, solve_joint, star_planarity};
+use hyperbolic_nets::{
+    AsymptoticField, Boundary, BoundaryPolygon, JointOptions, QuadNet, distances,
+    not_negatively_curved, solve_joint, star_planarity,
+};
 use std::ops::ControlFlow;
 
 fn quad_net(model: &AsymptoticNet) -> QuadNet {
@@ -73,4 +76,37 @@ fn flat_points_and_holes_become_exact() {
     // Four cells from flat point to flat point are few: nearer than this, W would leave 0.9..1.1.
     check_near("P cell", asymptotic_nets::schwarz_p_cell(4), 0.034, 0.1);
     check("holes", asymptotic_nets::enneper_with_holes());
+}
+
+fn with_boundary(model: &AsymptoticNet, boundary: Boundary) -> (Status, f64, f64) {
+    let net = quad_net(model);
+    let reference = TriMesh::from_poly_mesh(net.mesh());
+    let field = AsymptoticField::new(&reference);
+    let relaxed = not_negatively_curved(&net, &field);
+    let options = JointOptions { boundary, relaxed, ..JointOptions::default() };
+    let go_on = |_: &_| ControlFlow::Continue(());
+    let (surface, report) = solve_joint(&net, &reference, &options, go_on).unwrap();
+    let moved = BoundaryPolygon::deviation(&net, surface.net()) / net.mesh().mean_edge_length();
+    (report.status, surface.kink_statistics().max.to_degrees(), moved)
+}
+
+#[test]
+fn boundaries_are_kept_or_slid_along() {
+    // Where an exact net has the polygon it does not move at all.
+    let exact = asymptotic_nets::enneper().jittered_inside(0.001, 1);
+    let (status, kink, moved) = with_boundary(&exact, Boundary::Fixed);
+    assert!(status == Status::Converged && kink <= 1e-9, "{status:?} {kink} {moved}");
+    assert!(moved < 2e-3, "moved by {moved}");
+    // Smooth curves move little, others as much as their noise asks for.
+    let bulged = asymptotic_nets::bulged_enneper().jittered_inside(0.05, 1);
+    let rough = asymptotic_nets::catenoid_odd().jittered(0.05, 1);
+    for (model, boundary, most) in [
+        (&bulged, Boundary::Fixed, 2e-3),
+        (&rough, Boundary::Fixed, 0.05),
+        (&rough, Boundary::Glide, 0.05),
+    ] {
+        let (status, kink, moved) = with_boundary(model, boundary);
+        assert!(status == Status::Converged && kink <= 1e-9, "{boundary:?}: {status:?} {kink}");
+        assert!(moved <= most, "{boundary:?}: moved by {moved}");
+    }
 }
