@@ -8,7 +8,8 @@ use hyperbolic_nets::{HyperbolicNet, PatchJet, QuadNet, SampledPatches};
 use std::path::{Path, PathBuf};
 
 /// Formats of the commands on nets.
-pub(crate) const NET_OUTPUTS: [&str; 7] = ["ron", "step", "stp", "obj", "glb", "csv", "dxf"];
+pub(crate) const NET_OUTPUTS: [&str; 9] =
+    ["ron", "step", "stp", "obj", "glb", "ply", "stl", "csv", "dxf"];
 
 /// What an input holds.
 pub(crate) enum NetInput {
@@ -97,7 +98,7 @@ pub(crate) fn encode(
             }
             write(&Model { unit: unit.clone(), surfaces, ..Model::default() })
         }
-        "glb" => {
+        "glb" | "ply" | "stl" => {
             let sampled = SampledPatches::new(surface, PICTURE_CELLS, PatchJet::sample)
                 .map_err(Failure::other)?;
             write(&model(sampled_mesh("hyperbolic net", &sampled)))

@@ -54,7 +54,7 @@ fn saddle(n: usize) -> String {
 fn a_net_is_written_in_every_format_and_read_again() {
     let folder = tempfile::tempdir().expect("a folder");
     let path = |name: &str| folder.path().join(name).display().to_string();
-    let names = ["a.ron", "a.step", "a.obj", "a.glb", "a.csv", "a.dxf"];
+    let names = ["a.ron", "a.step", "a.obj", "a.glb", "a.csv", "a.dxf", "a.ply", "a.stl"];
     let outs = names.map(path);
     let json = path("a.json");
     let mut args = vec!["hnet", "fixtures/nets/helicoid.obj", "--metrics", &json];
@@ -122,7 +122,7 @@ fn transformations_that_do_not_exist_are_refused() {
     refused(&["darboux", net], "a.glb", &["--c", "--corner", "--cage"]);
     refused(&["darboux", net, "--corner", "9=0,0,0"], "a.glb", &["i=x,y,z"]);
     refused(&["darboux", net, "--corner", "7=2,2,1"], "a.glb", &["corners", "box"]);
-    refused(&["darboux", net, "--c", "0.5"], "a.step", &["step", "glb"]);
+    refused(&["darboux", net, "--c", "0.5"], "a.step", &["step", "glb", "ply"]);
     // Points far from the middle have no real image.
     refused(&["darboux", net, "--c", "1.2"], "a.glb", &["real domain"]);
 }

@@ -1,8 +1,9 @@
 //! `cargo xtask judges`: written files read again by independent programs.
 //!
 //! Open CASCADE evaluates every face of a STEP file on a grid of parameters; points, Gaussian and
-//! mean curvature must agree with our own evaluation of the same file. The glTF validator must
-//! find no error in a GLB file. What is not installed is skipped by name.
+//! mean curvature must agree with our own evaluation of the same file. geomdl does the same with
+//! points and derivatives of its own format. The glTF validator must find no error in a GLB file.
+//! What is not installed is skipped by name.
 
 use crate::shell::{Outcome, build_umbilic, check, root, umbilic};
 use bspline::BsplineSurface;
@@ -31,35 +32,42 @@ struct Face {
     samples: Vec<[f64; 7]>,
 }
 
+/// What the judge of geomdl prints of one surface.
+#[derive(Deserialize)]
+struct Derivatives {
+    /// u, v, S, S_u, S_v, S_uu, S_uv, S_vv.
+    samples: Vec<Vec<f64>>,
+}
+
+/// Orders of the derivatives, as geomdl's judge lists them.
+const ORDERS: [(usize, usize); 6] = [(0, 0), (1, 0), (0, 1), (2, 0), (1, 1), (0, 2)];
+
 /// A command that writes files to be judged; `{out}` is the scratch folder.
 struct Case {
     name: &'static str,
     arguments: &'static [&'static str],
-    step: Option<&'static str>,
-    glb: Option<&'static str>,
+    /// Whether `a.step`, `a.json` and `a.glb` are written.
+    step: bool,
+    json: bool,
+    glb: bool,
     /// Whether all boundaries are asymptotic curves, so that K there must be minus the torsion
     /// squared.
     asymptotic: bool,
 }
 
 const CASES: &[Case] = &[
-    Case::surface("saddle", &["convert", "fixtures/saddle.ron", "{out}/a.step"]),
-    Case::surface("tube, closed", &["convert", "fixtures/tube.ron", "{out}/a.step"]),
-    Case::surface("sphere cap, rational", &["convert", "fixtures/sphere-cap.ron", "{out}/a.step"]),
-    Case::surface(
-        "torus patch, rational",
-        &["convert", "fixtures/torus-patch.ron", "{out}/a.step"],
-    ),
-    Case {
-        name: "catenoid window, asymptotic boundary",
-        arguments: &["asymptotic", "fixtures/asymptotic/catenoid.ron", "-o", "{out}/a.step"],
-        step: Some("a.step"),
-        glb: None,
-        asymptotic: true,
-    },
-    Case {
-        name: "Enneper window, asymptotic boundary",
-        arguments: &[
+    Case::step("saddle", &["convert", "fixtures/saddle.ron", "{out}/a.step"]),
+    Case::step("tube, closed", &["convert", "fixtures/tube.ron", "{out}/a.step"]),
+    Case::step("sphere cap, rational", &["convert", "fixtures/sphere-cap.ron", "{out}/a.step"]),
+    Case::step("torus patch, rational", &["convert", "fixtures/torus-patch.ron", "{out}/a.step"]),
+    Case::step(
+        "catenoid window, asymptotic boundary",
+        &["asymptotic", "fixtures/asymptotic/catenoid.ron", "-o", "{out}/a.step"],
+    )
+    .asymptotic(),
+    Case::step(
+        "Enneper window, asymptotic boundary",
+        &[
             "asymptotic",
             "fixtures/asymptotic/enneper.ron",
             "-o",
@@ -67,32 +75,73 @@ const CASES: &[Case] = &[
             "-o",
             "{out}/a.glb",
         ],
-        step: Some("a.step"),
-        glb: Some("a.glb"),
-        asymptotic: true,
-    },
-    Case {
-        name: "saddle as GLB",
-        arguments: &["convert", "fixtures/saddle.ron", "{out}/a.glb"],
-        step: None,
-        glb: Some("a.glb"),
-        asymptotic: false,
-    },
+    )
+    .asymptotic()
+    .and_glb(),
+    Case::step(
+        "hyperbolic net of a helicoid",
+        &["hnet", "fixtures/nets/helicoid.obj", "-o", "{out}/a.step", "-o", "{out}/a.glb"],
+    )
+    .and_glb(),
+    Case::step(
+        "hyperbolic net around a flat point",
+        &["hnet", "fixtures/nets/p-disc.obj", "-o", "{out}/a.step"],
+    ),
+    Case::step(
+        "hyperbolic net, odd ring",
+        &["hnet", "fixtures/nets/catenoid-odd.obj", "-o", "{out}/a.step"],
+    ),
+    Case::json("near-helical surface", &["convert", "fixtures/near-helical.ron", "{out}/a.json"]),
+    Case::json("sphere cap, rational", &["convert", "fixtures/sphere-cap.ron", "{out}/a.json"]),
+    Case::json("tube, closed", &["convert", "fixtures/tube.ron", "{out}/a.json"]),
+    Case::glb("saddle as GLB", &["convert", "fixtures/saddle.ron", "{out}/a.glb"]),
+    Case::glb(
+        "Darboux transform as GLB",
+        &["darboux", "fixtures/nets/enneper.obj", "--c", "-0.6", "-o", "{out}/a.glb"],
+    ),
 ];
 
 impl Case {
-    const fn surface(name: &'static str, arguments: &'static [&'static str]) -> Self {
-        Self { name, arguments, step: Some("a.step"), glb: None, asymptotic: false }
+    const fn files(
+        name: &'static str,
+        arguments: &'static [&'static str],
+        [step, json, glb]: [bool; 3],
+    ) -> Self {
+        Self { name, arguments, step, json, glb, asymptotic: false }
+    }
+
+    const fn step(name: &'static str, arguments: &'static [&'static str]) -> Self {
+        Self::files(name, arguments, [true, false, false])
+    }
+
+    const fn json(name: &'static str, arguments: &'static [&'static str]) -> Self {
+        Self::files(name, arguments, [false, true, false])
+    }
+
+    const fn glb(name: &'static str, arguments: &'static [&'static str]) -> Self {
+        Self::files(name, arguments, [false, false, true])
+    }
+
+    const fn and_glb(mut self) -> Self {
+        self.glb = true;
+        self
+    }
+
+    const fn asymptotic(mut self) -> Self {
+        self.asymptotic = true;
+        self
     }
 }
 
 /// Judges all cases; fails on the first disagreement.
 pub(crate) fn run() -> Outcome {
     build_umbilic()?;
-    let python = python_with_open_cascade();
+    let python = python_with("OCP");
+    let geomdl = python_with("geomdl");
     let node = node_with_validator();
     for (missing, name, wanted) in [
         (python.is_none(), "Open CASCADE", "a python3 (or UMBILIC_JUDGE_PYTHON) with OCP 7.9.3.1"),
+        (geomdl.is_none(), "geomdl", "a python3 (or UMBILIC_JUDGE_PYTHON) with geomdl 5"),
         (node.is_none(), "the glTF validator", "node with gltf-validator on NODE_PATH"),
     ] {
         if missing {
@@ -103,14 +152,19 @@ pub(crate) fn run() -> Outcome {
         let out = root().join("target/judges").join(k.to_string());
         std::fs::create_dir_all(&out).map_err(|e| format!("{}: {e}", out.display()))?;
         write_files(case, &out)?;
-        if let (Some(python), Some(file)) = (&python, case.step) {
-            let said = judge_step(python, &out.join(file), case.asymptotic)
+        if let (Some(python), true) = (&python, case.step) {
+            let said = judge_step(python, &out.join("a.step"), case.asymptotic)
                 .map_err(|e| format!("{}: {e}", case.name))?;
             println!("{}: Open CASCADE agrees: {said}", case.name);
         }
-        if let (Some(node), Some(file)) = (&node, case.glb) {
+        if let (Some(python), true) = (&geomdl, case.json) {
+            let said = judge_json(python, &out.join("a.json"))
+                .map_err(|e| format!("{}: {e}", case.name))?;
+            println!("{}: geomdl agrees: {said}", case.name);
+        }
+        if let (Some(node), true) = (&node, case.glb) {
             let mut validator = Command::new(node);
-            validator.arg(root().join("xtask/judges/gltf.cjs")).arg(out.join(file));
+            validator.arg(root().join("xtask/judges/gltf.cjs")).arg(out.join("a.glb"));
             check(validator).map_err(|e| format!("{}: {e}", case.name))?;
         }
     }
@@ -124,10 +178,10 @@ fn write_files(case: &Case, out: &Path) -> Outcome {
     check(command).map_err(|e| format!("{}: {e}", case.name))
 }
 
-fn python_with_open_cascade() -> Option<PathBuf> {
+fn python_with(package: &str) -> Option<PathBuf> {
     let chosen = std::env::var_os("UMBILIC_JUDGE_PYTHON").map(PathBuf::from);
     let python = chosen.unwrap_or_else(|| "python3".into());
-    let tried = Command::new(&python).args(["-c", "import OCP"]).output();
+    let tried = Command::new(&python).args(["-c", &format!("import {package}")]).output();
     tried.is_ok_and(|output| output.status.success()).then_some(python)
 }
 
@@ -136,16 +190,57 @@ fn node_with_validator() -> Option<PathBuf> {
     tried.is_ok_and(|output| output.status.success()).then(|| "node".into())
 }
 
+/// What a judge in Python prints about a file.
+fn ask(python: &Path, judge: &str, file: &Path) -> Outcome<String> {
+    let mut command = Command::new(python);
+    command.arg(root().join("xtask/judges").join(judge)).arg(file).arg(SAMPLES.to_string());
+    let output = command.output().map_err(|e| format!("the judge could not start: {e}"))?;
+    if output.status.success() {
+        Ok(String::from_utf8_lossy(&output.stdout).into_owned())
+    } else {
+        Err(String::from_utf8_lossy(&output.stderr).into_owned())
+    }
+}
+
+/// Compares points and derivatives, each relative to the largest of its order on the surface.
+fn judge_json(python: &Path, file: &Path) -> Outcome<String> {
+    let theirs: Vec<Derivatives> = serde_json::from_str(&ask(python, "spline_library.py", file)?)
+        .map_err(|e| format!("the judge said: {e}"))?;
+    let model = exchange::read_model(file).map_err(|e| e.to_string())?;
+    if theirs.len() != model.surfaces.len() {
+        return Err(format!("{} surfaces read, {} written", theirs.len(), model.surfaces.len()));
+    }
+    let mut worst = [0.0_f64; ORDERS.len()];
+    for (theirs, ours) in theirs.iter().zip(&model.surfaces) {
+        for (k, &(a, b)) in ORDERS.iter().enumerate() {
+            let (mut size, mut difference) = (0.0_f64, 0.0_f64);
+            for sample in &theirs.samples {
+                let [u, v, rest @ ..] = sample.as_slice() else {
+                    return Err("a sample without parameters".to_owned());
+                };
+                let Some(&[x, y, z]) = rest.as_chunks().0.get(k) else {
+                    return Err(format!("a sample without derivative ({a}, {b})"));
+                };
+                let got = geom_core::DVec3::new(x, y, z);
+                size = size.max(got.length());
+                difference = difference.max(ours.surface.jet(*u, *v, 2).d(a, b).distance(got));
+            }
+            // Written so that NaN is a disagreement.
+            worst[k] = worst[k].max(if difference > 0.0 { difference / size } else { difference });
+            if !(difference <= AGREEMENT * size) {
+                return Err(format!("derivative ({a}, {b}) differs by {difference:.1e} of {size}"));
+            }
+        }
+    }
+    let [point, u, v, uu, uv, vv] = worst;
+    let (first, second) = (u.max(v), uu.max(uv).max(vv));
+    Ok(format!("points to {point:.1e}, derivatives to {first:.1e} and {second:.1e}"))
+}
+
 /// Compares every sample of every face; returns the largest differences in words.
 fn judge_step(python: &Path, file: &Path, asymptotic: bool) -> Outcome<String> {
-    let mut judge = Command::new(python);
-    judge.arg(root().join("xtask/judges/open_cascade.py")).arg(file).arg(SAMPLES.to_string());
-    let output = judge.output().map_err(|e| format!("the judge could not start: {e}"))?;
-    if !output.status.success() {
-        return Err(String::from_utf8_lossy(&output.stderr).into_owned());
-    }
+    let text = ask(python, "open_cascade.py", file)?;
     // The reader itself may print a report before the JSON.
-    let text = String::from_utf8_lossy(&output.stdout);
     let json = text.find("{\"roots\"").map_or("", |at| &text[at..]);
     let verdict: Verdict =
         serde_json::from_str(json).map_err(|e| format!("the judge said: {e}"))?;

@@ -122,7 +122,7 @@ impl Darboux {
         if let Some(path) = &self.report {
             crate::args::check_output_path(path)?;
         }
-        net_files::check_outputs(&self.output.output, &["glb", "obj"])?;
+        net_files::check_outputs(&self.output.output, &["glb", "obj", "ply", "stl"])?;
         let (input, unit, mut warnings) = net_files::read(&self.input)?;
         let (surface, status, steps) = match input {
             NetInput::Net(surface) => (*surface, Status::Converged, 0),
@@ -279,11 +279,13 @@ fn add_image(
     let name = if branch == Branch::Regular { "regular image" } else { "other image" };
     let view = net_report::view(name, &sampled, unit).map_err(|e| e.to_string())?;
     // An edge of the cage outside the real domain, or through infinity, is left out.
-    let edges = CAGE_EDGES.iter().filter_map(|e| {
-        hyperbolic_nets::image_of_segment(map, branch, e.map(|k| corners[k]), 24).ok()
-    });
+    let arc = |ends: [DVec3; 2]| hyperbolic_nets::image_of_segment(map, branch, ends, 24).ok();
+    let edges = CAGE_EDGES.iter().filter_map(|e| arc(e.map(|k| corners[k])));
     let mut cage = LineSet::new("cage", "transformed cage", LineRole::ControlNet, edges.collect());
     cage.visible = true;
+    let faces = hyperbolic_nets::cage_face_lines(corners, 3).into_iter().filter_map(arc);
+    let title = "spherical faces of the cage";
+    let faces = LineSet::new("cage-faces", title, LineRole::ControlNet, faces.collect());
     let arcs = surface.net().edges().iter().map(|e| {
         let ends = e.ends.map(|v| surface.net().positions()[v]);
         hyperbolic_nets::image_of_segment(map, branch, ends, 6)
@@ -291,7 +293,8 @@ fn add_image(
     let arcs = arcs.collect::<Result<Vec<_>, _>>().map_err(text)?;
     let mut panels = LineSet::new("panels", "panel edges (circular arcs)", LineRole::Curves, arcs);
     panels.visible = true;
-    let view = view.with_lines(cage).and_then(|v| v.with_lines(panels));
+    let view =
+        view.with_lines(cage).and_then(|v| v.with_lines(faces)).and_then(|v| v.with_lines(panels));
     page.stages.push(view.map_err(|e| e.to_string())?);
     Ok(())
 }
