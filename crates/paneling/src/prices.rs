@@ -23,11 +23,17 @@ pub struct PriceList {
 }
 
 impl PriceList {
+    /// A list with these types.
+    #[must_use]
+    pub fn new(prices: impl IntoIterator<Item = (MoldType, Price)>) -> Self {
+        Self { prices: prices.into_iter().collect() }
+    }
+
     /// Every mold costs 1 and panels nothing: the total cost is the number of molds.
     #[must_use]
     pub fn counting_molds() -> Self {
         let price = Price { mold: 1.0, panel: 0.0 };
-        Self { prices: MoldType::ALL.into_iter().map(|kind| (kind, price)).collect() }
+        Self::new(MoldType::ALL.map(|kind| (kind, price)))
     }
 
     /// Checks that every one of `types` has a usable price.
