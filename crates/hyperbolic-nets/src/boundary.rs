@@ -77,7 +77,7 @@ impl BoundaryPolygon {
                 sum += if k % 2 == 0 { log } else { -log };
             }
             // The plane at a straight corner is free, so nothing is prescribed around the loop.
-            if count % 2 == 0 && !straight {
+            if count.is_multiple_of(2) && !straight {
                 closing = closing.max(sum.abs());
             }
         }
