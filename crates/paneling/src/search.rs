@@ -107,21 +107,29 @@ pub fn panel_within(
     let features = clustering::features(&search.scaled, options.slope_weight);
     let mut best: Option<Bounded> = None;
     let mut attempts = 0;
-    for start in STARTS {
-        let molds = crate::paneling::mold_count(start, set.len());
+    // How far from the design a cheaper type may lead, in halves of the bounds. Seams often need
+    // less than the sum of what their two panels deviate.
+    let slacks: &[f64] = if types.len() > 1 { &[1.0, 2.0, f64::INFINITY] } else { &[1.0] };
+    let counts = STARTS.map(|start| crate::paneling::mold_count(start, set.len()));
+    for (k, (&molds, &slack)) in
+        counts.iter().flat_map(|m| slacks.iter().map(move |s| (m, s))).enumerate()
+    {
+        if k >= slacks.len() && counts[k / slacks.len() - 1] == molds {
+            continue;
+        }
         let limit = best.as_ref().filter(|b| b.is_within).map_or(f64::INFINITY, |b| b.cost);
-        let found = search.from(molds, &features, limit, &mut attempts);
+        let found = search.from(molds, slack, &features, limit, &mut attempts);
         let is_better = match &best {
             None => true,
             Some(b) if found.is_within => !b.is_within || found.cost < b.cost,
             Some(b) => !b.is_within && found.worst_excess < b.worst_excess,
         };
-        // Starts rise, so once a start alone costs more than the best there is nothing to gain.
         let is_hopeless = !is_better && best.as_ref().is_some_and(|b| b.is_within);
         if is_better {
             best = Some(found);
         }
-        if is_hopeless || molds == set.len() {
+        // Starts rise, so once a start alone costs more than the best there is nothing to gain.
+        if is_hopeless && types.len() == 1 {
             break;
         }
     }
@@ -145,13 +153,14 @@ impl Search<'_> {
     fn from(
         &self,
         molds: usize,
+        slack: f64,
         features: &[Feature],
         limit: f64,
         attempts: &mut usize,
     ) -> Bounded {
         let options = Options { molds, ..self.options.clone() };
         let clusters = cluster(self.set, features, &options);
-        let mut fit = self.cheapest_types(&clusters, &options);
+        let mut fit = self.cheapest_types(&clusters, slack, &options);
         let mut weights = vec![1.0; self.scaled.seams.len()];
         let mut fit_history = fit.alternate(&self.scaled, options.rounds);
         let mut best: Option<(f64, Fit, Vec<f64>)> = None;
@@ -195,7 +204,12 @@ impl Search<'_> {
 
     /// Each cluster with the cheapest type that keeps its panels within half of the bounds of the
     /// design (two panels meet at a seam), or the most general type.
-    fn cheapest_types(&self, clusters: &clustering::Clusters, options: &Options) -> Fit {
+    fn cheapest_types(
+        &self,
+        clusters: &clustering::Clusters,
+        slack: f64,
+        options: &Options,
+    ) -> Fit {
         let general = self.types[self.types.len() - 1];
         let fitted = |kind: MoldType| {
             let kinds = vec![kind; clusters.count];
@@ -214,7 +228,7 @@ impl Search<'_> {
                 // At equal cost the simpler type, which comes earlier, is kept too.
                 let is_wanted =
                     cost < costs[m] || (cost == costs[m] && result.molds[m].kind == general);
-                if is_wanted && members.iter().all(|&p| self.half_excess(&other, p) <= 1.0) {
+                if is_wanted && members.iter().all(|&p| self.half_excess(&other, p) <= slack) {
                     costs[m] = cost;
                     result.molds[m] = other.molds[m];
                     for &p in members {
@@ -273,5 +287,88 @@ impl Search<'_> {
             }
         }
         changed
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::clustering::Clusters;
+    use crate::prices::Price;
+    use crate::{Layout, Pattern};
+    use fixtures::surfaces::Shape;
+
+    /// All ways to put `n` panels into groups, as the group of each panel.
+    fn partitions(n: usize) -> Vec<Vec<usize>> {
+        let mut all = vec![vec![]];
+        for _ in 0..n {
+            all = all
+                .into_iter()
+                .flat_map(|labels: Vec<usize>| {
+                    let groups = labels.iter().max().map_or(0, |m| m + 1);
+                    (0..=groups).map(move |g| labels.iter().copied().chain([g]).collect())
+                })
+                .collect();
+        }
+        all
+    }
+
+    /// The least cost over every grouping and every choice of types whose seams are within bounds.
+    fn least_cost(
+        set: &PanelSet,
+        bounds: &Bounds,
+        types: &[MoldType],
+        prices: &PriceList,
+        options: &Options,
+    ) -> f64 {
+        let scaled = set.scaled(1.0 / set.size);
+        let bounds = Bounds { max_gap: bounds.max_gap.map(|g| g / set.size), ..*bounds };
+        let weights = vec![1.0; set.seams().len()];
+        let mut least = f64::INFINITY;
+        for labels in partitions(set.len()) {
+            let count = labels.iter().max().map_or(0, |m| m + 1);
+            let clusters = Clusters { labels, turned: vec![false; set.len()], count };
+            for choice in 0..types.len().pow(count as u32) {
+                let kinds: Vec<MoldType> = (0..count as u32)
+                    .map(|m| types[choice / types.len().pow(m) % types.len()])
+                    .collect();
+                let mut fit = Fit::new(&scaled, &clusters, &kinds, options.slope_weight);
+                fit.alternate(&scaled, options.rounds);
+                seam_step::improve(&scaled, &mut fit, &options.seam_settings(), &weights);
+                let measures = measure(&scaled, &fit.molds, &fit.labels, &fit.poses);
+                if bounds.worst_excess(&measures) <= 1.0 {
+                    let molds = fit.molds.iter().zip(&fit.members);
+                    least = least.min(molds.map(|(m, p)| prices.cost(m.kind, p.len())).sum());
+                }
+            }
+        }
+        least
+    }
+
+    #[test]
+    fn tiny_designs_cost_no_more_than_by_trying_everything() {
+        let price = |mold, panel| Price { mold, panel };
+        let plane_first = [
+            (MoldType::Plane, price(1.0, 1.0)),
+            (MoldType::Paraboloid, price(5.0, 2.0)),
+            (MoldType::Cubic, price(9.0, 3.0)),
+        ];
+        let even = plane_first.map(|(kind, _)| (kind, price(1.0, 0.0)));
+        let types = plane_first.map(|(kind, _)| kind);
+        let surface = Shape::Roof.surface(10, 10, 4, 4);
+        let layout = Layout::generate(Pattern::Quad, 2, 2, [false; 2]).unwrap();
+        let set = PanelSet::new(&surface, &layout).unwrap();
+        let options = Options::with_molds(1);
+        for prices in [plane_first, even] {
+            let prices = PriceList::new(prices);
+            for degrees in [40.0_f64, 12.0, 6.0, 3.0] {
+                let bounds = Bounds { max_kink: Some(degrees.to_radians()), max_gap: None };
+                let found = panel_within(&set, &bounds, &types, &prices, &options).unwrap();
+                let least = least_cost(&set, &bounds, &types, &prices, &options);
+                assert_eq!(found.is_within, least.is_finite(), "{degrees}");
+                let case = format!("{degrees}°: found {}, least {least}", found.cost);
+                assert!(!found.is_within || found.cost <= least + 1e-9, "{case}");
+            }
+        }
     }
 }
