@@ -199,3 +199,100 @@ fn quad_files_of_any_format_are_analysed_as_subdivision_surfaces() {
     assert_eq!(result.status.code(), Some(2));
     assert!(String::from_utf8_lossy(&result.stderr).contains("needs a mesh"));
 }
+
+/// Runs `fair` and gives its metrics.
+fn metrics(args: &[&str]) -> serde_json::Value {
+    let folder = tempfile::tempdir().expect("a folder");
+    let (obj, json) = (folder.path().join("a.obj"), folder.path().join("a.json"));
+    let (obj, json) = (obj.display().to_string(), json.display().to_string());
+    let mut all = vec!["fair"];
+    all.extend(args);
+    all.extend(["-o", &obj, "--metrics", &json]);
+    let result = umbilic(&all);
+    assert!(result.status.success(), "{args:?}: {}", String::from_utf8_lossy(&result.stderr));
+    serde_json::from_str(&fs::read_to_string(&json).expect("metrics")).expect("JSON")
+}
+
+fn energies(m: &serde_json::Value) -> [f64; 2] {
+    ["energy_initial", "energy_final"].map(|key| m["metrics"][key].as_f64().expect(key))
+}
+
+#[test]
+fn every_method_blend_and_symmetry_lowers_the_energy() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let half_turn = written(
+        folder.path(),
+        "s.ron",
+        "(matrices: [((-1, 0, 0), (0, -1, 0), (0, 0, 1)), ((1, 0, 0), (0, 1, 0), (0, 0, -1))])",
+    );
+    for choice in [
+        ["--method", "lagged-gauss-newton"],
+        ["--method", "gauss-newton"],
+        ["--method", "sobolev"],
+        ["--method", "lbfgs"],
+        ["--blend", "smooth"],
+        ["--blend", "flat"],
+        ["--symmetry", "auto"],
+        ["--symmetry", "none"],
+        ["--symmetry", &half_turn],
+    ] {
+        let mut args = vec![THETA, "--levels", "0", "--iterations", "20"];
+        args.extend(choice);
+        let [before, after] = energies(&metrics(&args));
+        assert!(after < 0.9 * before, "{choice:?}: {before} {after}");
+    }
+}
+
+#[test]
+fn constraints_and_creases_are_read_from_files() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let sphere = "fixtures/quads/ellipsoid.obj";
+    let fix = written(
+        folder.path(),
+        "f.ron",
+        "(vertices: [0], limit_points: [(3, None), (4, Some((0.0, 0.0, 1.0)))],
+          tangent_planes: [(3, None)], weights: [(5, 10.0)])",
+    );
+    let common = ["--energy", "bending", "--levels", "0", "--iterations", "8"];
+    let mut args = vec![sphere, "--fix", &fix];
+    args.extend(common);
+    assert!(energies(&metrics(&args)).iter().all(|e| e.is_finite()));
+    let text = fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join("..").join(sphere));
+    let text = text.expect("a fixture");
+    let face: Vec<u32> = text
+        .lines()
+        .find_map(|line| line.strip_prefix("f "))
+        .expect("a face")
+        .split_whitespace()
+        .map(|word| word.split('/').next().and_then(|n| n.parse().ok()).expect("a number"))
+        .collect();
+    let (a, b) = (face[0] - 1, face[1] - 1);
+    let creases = format!("(edges: [(({a}, {b}), 1.5)], corners: [{a}])");
+    let creases = written(folder.path(), "c.ron", &creases);
+    let mut args = vec![sphere, "--creases", &creases];
+    args.extend(common);
+    let [before, after] = energies(&metrics(&args));
+    assert!(after < before, "{before} {after}");
+    let wrong = format!("(edges: [(({a}, {}), 1.5)])", face[2] - 1);
+    let wrong = written(folder.path(), "w.ron", &wrong);
+    refused(&[sphere, "--creases", &wrong], &["no edge"]);
+    let clamped = ["--clamp-boundary", "--energy", "area + 0.1*bending", "--iterations", "8"];
+    let mut args = vec!["fixtures/quads/lamp-shade.obj", "--levels", "0"];
+    args.extend(clamped);
+    let [before, after] = energies(&metrics(&args));
+    assert!(after < before, "{before} {after}");
+}
+
+#[test]
+fn step_files_have_a_face_for_every_patch() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let step = folder.path().join("a.step");
+    let m =
+        metrics(&[THETA, "--levels", "0", "--iterations", "1", "-o", &step.display().to_string()]);
+    let text = fs::read_to_string(&step).expect("a STEP file");
+    let faces = text.matches("ADVANCED_FACE").count() as u64;
+    assert_eq!(m["metrics"]["patches"].as_u64(), Some(faces));
+    let fitted = m["metrics"]["fitted_patches"].as_u64().expect("a count");
+    assert!(fitted > 0 && fitted <= faces, "{fitted} of {faces}");
+    assert!(m["metrics"]["fitted_deviation_max"].as_f64().expect("a distance") < 1e-3);
+}

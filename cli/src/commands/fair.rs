@@ -6,19 +6,19 @@ use crate::failure::Failure;
 use crate::layered;
 use crate::outcome::{Outcome, Status};
 use crate::report_support;
-use bspline::{BsplineSurface, Degree, KnotVector};
 use curvature_variation::{
     Constraints, Energy, FairOptions, FairProgress, FairReport, Fairing, Functional, Method,
-    Quadrature, SurfaceSamples, SymmetryMode, fair, fair_in_family, fitted_torus,
+    Quadrature, SplinePatches, SurfaceSamples, SymmetryMode, fair, fair_in_family, fitted_torus,
+    spline_patches,
 };
 use exchange::{Field, LengthUnit, Mesh, Model, NamedSurface};
-use geom_core::{DVec3, UmbilicKind};
+use geom_core::{BoundingBox, DVec3, UmbilicKind};
 use report::{EnergyHistory, FieldScale, LineRole, LineSet, ScalarField, Series, SurfaceView};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
-use subdiv_catmull_clark::{Blend, Creases, SubdivisionSurface};
+use subdiv_catmull_clark::{Blend, CreaseList, Creases, SubdivisionSurface};
 
 /// Arguments of `fair`.
 #[derive(Debug, clap::Args)]
@@ -66,12 +66,15 @@ struct Settings {
     /// Keep the boundary and the two rings next to it
     #[arg(long, num_args = 0, default_missing_value = "true")]
     clamp_boundary: Option<bool>,
-    /// Fixed vertices, pinned limit points and tangent planes
+    /// Fixed vertices, pinned or pulled limit points, pinned tangent planes
     #[arg(long, value_name = "FILE.ron")]
     fix: Option<PathBuf>,
     /// Stay among the blends of the input and this mesh of the same faces; repeatable
     #[arg(long, value_name = "QUADS")]
     family: Option<Vec<PathBuf>>,
+    /// Semi-sharp and sharp edges, corners
+    #[arg(long, value_name = "FILE.ron")]
+    creases: Option<PathBuf>,
     /// Symmetries to keep: auto, none, or a RON file with matrices [default: auto]
     #[arg(long, value_name = "auto|none|FILE.ron")]
     symmetry: Option<String>,
@@ -86,6 +89,7 @@ layered!(Settings {
     clamp_boundary,
     fix,
     family,
+    creases,
     symmetry
 });
 
@@ -111,15 +115,19 @@ impl Fair {
         self.report.check()?;
         let settings = self.settings.over(self.config.load()?);
         let family = settings.family.clone().unwrap_or_default();
-        let (options, constraints) = settings.resolve()?;
-        if !family.is_empty() && !constraints.is_empty() {
+        let Resolved { options, constraints, creases: listed } = settings.resolve()?;
+        if !family.is_empty() && !(constraints.is_empty() && listed.is_none()) {
             return Err(Failure::usage(
-                "--family leaves no vertex to fix; drop --fix and --clamp-boundary",
+                "--family leaves no vertex to fix; drop --fix, --creases and --clamp-boundary",
             ));
         }
         let model =
             exchange::read_model(&self.input).map_err(|e| Failure::input(&self.input, e))?;
         let mesh = read_control_mesh(&self.input, &model)?;
+        let creases = match &listed {
+            Some((path, list)) => list.for_mesh(&mesh).map_err(|e| Failure::input(path, e))?,
+            None => Creases::none(),
+        };
         let bar = context.progress("fairing", (options.levels + 1) * options.iterations);
         let mut observer = |p: &FairProgress| {
             let done = p.level * options.iterations + p.iteration;
@@ -127,7 +135,7 @@ impl Fair {
             if context.interrupted() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
         };
         let result = if family.is_empty() {
-            fair(&mesh, &Creases::none(), &constraints, &options, &mut observer)
+            fair(&mesh, &creases, &constraints, &options, &mut observer)
         } else {
             let members =
                 family.iter().map(|path| read_member(path)).collect::<Result<Vec<_>, _>>()?;
@@ -135,11 +143,27 @@ impl Fair {
         }
         .map_err(|e| Failure::input(&self.input, e))?;
         drop(bar);
+        let splines = match self.output.output.iter().find(|path| is_spline_file(path)) {
+            Some(path) => Some(
+                spline_patches(&result.mesh, &result.surface)
+                    .map_err(|e| Failure::input(path, e))?,
+            ),
+            None => None,
+        };
         let mut outcome = Outcome::new(status(result.report.status), result.report.iterations)
             .with_input(&self.input)
-            .with_metrics(&MetricsObject::new(&result))?;
+            .with_metrics(&MetricsObject::new(&result, splines.as_ref()))?;
         outcome.summary = summary(&result, &options);
         outcome.warnings.clone_from(&model.warnings);
+        if let Some(splines) = &splines {
+            outcome.summary.push(spline_summary(splines));
+            if splines.max_deviation > FITTED_TOLERANCE * diagonal(&result.mesh) {
+                outcome.warnings.push(format!(
+                    "fitted spline patches are up to {:.1e} off the surface; add a level",
+                    splines.max_deviation
+                ));
+            }
+        }
         if result.report.quadrature_gap > 0.01 {
             outcome.warnings.push(format!(
                 "the energy changes by {:.1} % with a finer quadrature; add a level",
@@ -148,7 +172,7 @@ impl Fair {
         }
         outcome.require_converged = self.converged.require_converged;
         for path in self.output.output {
-            let content = content_for(&path, &result, &model.unit, &mut outcome.warnings)?;
+            let content = content_for(&path, &result, splines.as_ref(), &model.unit);
             let bytes =
                 exchange::encode_model(&path, &content).map_err(|e| Failure::input(&path, e))?;
             outcome.files.push((path, bytes));
@@ -162,8 +186,16 @@ impl Fair {
     }
 }
 
+/// What the flags and the files they name come to.
+struct Resolved {
+    options: FairOptions,
+    constraints: Constraints,
+    /// With the file, for messages.
+    creases: Option<(PathBuf, CreaseList)>,
+}
+
 impl Settings {
-    fn resolve(self) -> Result<(FairOptions, Constraints), Failure> {
+    fn resolve(self) -> Result<Resolved, Failure> {
         let defaults = FairOptions::default();
         let energy = match &self.energy {
             Some(text) => text.parse::<Energy>().map_err(Failure::usage)?,
@@ -202,7 +234,14 @@ impl Settings {
             symmetry,
             ..defaults
         };
-        Ok((options, constraints))
+        let creases = match self.creases {
+            Some(path) => {
+                let list = exchange::read_ron(&path).map_err(|e| Failure::input(&path, e))?;
+                Some((path, list))
+            }
+            None => None,
+        };
+        Ok(Resolved { options, constraints, creases })
     }
 }
 
@@ -258,10 +297,14 @@ struct MetricsObject {
     patches: usize,
     ms_per_gradient: f64,
     peak_memory_mb: Option<f64>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    fitted_patches: Option<usize>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    fitted_deviation_max: Option<f64>,
 }
 
 impl MetricsObject {
-    fn new(result: &Fairing) -> Self {
+    fn new(result: &Fairing, splines: Option<&SplinePatches>) -> Self {
         let FairReport { after, quadrature_gap, energy_initial, energy_final, .. } = &result.report;
         let residual = result.report.gauss_bonnet_residual;
         let torus = fitted_torus(&result.mesh, &result.surface);
@@ -278,6 +321,8 @@ impl MetricsObject {
             patches: result.mesh.face_count(),
             ms_per_gradient: 1e3 * result.report.seconds_per_gradient,
             peak_memory_mb: peak_memory_mb(),
+            fitted_patches: splines.map(|s| s.fitted),
+            fitted_deviation_max: splines.map(|s| s.max_deviation),
         }
     }
 }
@@ -341,24 +386,46 @@ fn summary(result: &Fairing, options: &FairOptions) -> Vec<String> {
     lines
 }
 
+/// Distance of a fitted spline patch from the surface that is worth a warning, as a share of the
+/// bounding box' diagonal.
+const FITTED_TOLERANCE: f64 = 1e-4;
+
+fn diagonal(mesh: &geom_core::PolyMesh) -> f64 {
+    BoundingBox::of(mesh.positions().iter().copied()).map_or(0.0, BoundingBox::diagonal)
+}
+
+/// Whether a file takes spline surfaces.
+fn is_spline_file(path: &Path) -> bool {
+    matches!(exchange::extension_of(path).as_str(), "step" | "stp" | "ron")
+}
+
+fn spline_summary(splines: &SplinePatches) -> String {
+    let faces = splines.surfaces.len();
+    if splines.fitted == 0 {
+        return format!("  {faces} spline patches, all of them exact");
+    }
+    format!(
+        "  {faces} spline patches, {} of them fitted at extraordinary vertices and creases, at most {:.1e} off the surface",
+        splines.fitted, splines.max_deviation
+    )
+}
+
 /// Control mesh, sampled surface or spline patches, as the format asks for.
 fn content_for(
     path: &Path,
     result: &Fairing,
+    splines: Option<&SplinePatches>,
     unit: &LengthUnit,
-    warnings: &mut Vec<String>,
-) -> Result<Model, Failure> {
+) -> Model {
+    let unit = unit.clone();
+    if let Some(splines) = splines.filter(|_| is_spline_file(path)) {
+        let named = splines.surfaces.iter().map(|(face, surface)| NamedSurface {
+            name: format!("patch {}", face.0),
+            surface: surface.clone(),
+        });
+        return Model { unit, surfaces: named.collect(), ..Model::default() };
+    }
     match exchange::extension_of(path).as_str() {
-        "step" | "stp" | "ron" => {
-            let (surfaces, left_out) = spline_patches(result)?;
-            if left_out > 0 {
-                warnings.push(format!(
-                    "{}: {left_out} patches at extraordinary vertices are not bi-cubic and are left out",
-                    path.display()
-                ));
-            }
-            Ok(Model { unit: unit.clone(), surfaces, ..Model::default() })
-        }
         "glb" | "gltf" => {
             let samples = samples_of(&result.mesh, &result.surface);
             let mut mesh = Mesh::new(samples.positions, samples.triangles);
@@ -370,33 +437,15 @@ fn content_for(
                 field("K1", samples.k1),
                 field("K2", samples.k2),
             ];
-            Ok(Model::of_mesh(mesh, unit.clone()))
+            Model::of_mesh(mesh, unit)
         }
-        _ => Ok(Model::of_mesh(Mesh::from_poly_mesh(&result.mesh), unit.clone())),
+        _ => Model::of_mesh(Mesh::from_poly_mesh(&result.mesh), unit),
     }
 }
 
 fn samples_of(mesh: &geom_core::PolyMesh, surface: &SubdivisionSurface) -> SurfaceSamples {
     let side = report_support::jets::JetGrid::side_for(mesh.face_count()).min(12);
     SurfaceSamples::new(mesh, surface, side)
-}
-
-fn spline_patches(result: &Fairing) -> Result<(Vec<NamedSurface>, usize), Failure> {
-    let degree = Degree::new(3).map_err(Failure::other)?;
-    let knots = KnotVector::clamped_uniform(degree, 4).map_err(Failure::other)?;
-    let mut surfaces = Vec::new();
-    let mut left_out = 0;
-    for patch in result.surface.patches() {
-        let Some(points) = result.surface.bezier(result.mesh.positions(), patch) else {
-            left_out += 1;
-            continue;
-        };
-        let points: Vec<DVec3> = points.into_iter().flatten().collect();
-        let surface = BsplineSurface::new(knots.clone(), knots.clone(), points, None)
-            .map_err(Failure::other)?;
-        surfaces.push(NamedSurface { name: format!("patch {}", patch.face.0), surface });
-    }
-    Ok((surfaces, left_out))
 }
 
 fn fill_report(
@@ -409,10 +458,8 @@ fn fill_report(
     page.option("energy", &options.energy);
     page.option("levels", options.levels);
     page.option("iterations per level", options.iterations);
-    let creases = Creases::none();
-    if let Ok(before) = SubdivisionSurface::new(&result.initial, &creases, options.blend) {
-        page.stages.push(view("before", &samples_of(&result.initial, &before), &page.length_unit)?);
-    }
+    let before = samples_of(&result.initial, &result.initial_surface);
+    page.stages.push(view("before", &before, &page.length_unit)?);
     let samples = samples_of(&result.mesh, &result.surface);
     let count = |kind| samples.umbilics.iter().filter(|u| u.kind == kind).count();
     page.option(

@@ -17,6 +17,10 @@ pub struct Constraints {
     /// Vertices whose limit tangent planes are pinned, each by its normal or, with `None`, as it
     /// is.
     pub tangent_planes: Vec<(u32, Option<[f64; 3]>)>,
+    /// Vertices whose limit points are pulled to where they are: the energy gains
+    /// `weight · distance² / A`, `A` the area of the input, so that a weight means the same at any
+    /// size of the model.
+    pub weights: Vec<(u32, f64)>,
     /// Fixes the boundary and the two rings next to it on every level, which keeps position,
     /// tangents and curvatures along the boundary (Joshi 2008, sec. 8), and leaves the quads at
     /// the boundary out of the energy.
@@ -30,10 +34,16 @@ impl Constraints {
         *self == Self::default()
     }
 
+    /// Whether points or planes of the limit surface are asked for, exactly or by weights.
+    pub(crate) fn concern_limits(&self) -> bool {
+        !(self.limit_points.is_empty() && self.tangent_planes.is_empty() && self.weights.is_empty())
+    }
+
     /// The largest vertex number used.
     pub(crate) fn largest_vertex(&self) -> Option<u32> {
         let lists = self.limit_points.iter().chain(&self.tangent_planes).map(|p| p.0);
-        self.vertices.iter().copied().chain(lists).max()
+        let weighted = self.weights.iter().map(|w| w.0);
+        self.vertices.iter().copied().chain(lists).chain(weighted).max()
     }
 }
 
@@ -59,6 +69,73 @@ pub(crate) fn refine_fixed(fixed: &[bool], stencils: &Stencils) -> Vec<bool> {
                 || stencils.row(i).0.iter().all(|&v| fixed[v as usize])
         })
         .collect()
+}
+
+/// A limit point that is pulled to a place: the energy gains `factor · |point − place|²`.
+#[derive(Clone, Debug)]
+pub(crate) struct Pull {
+    /// The limit point as a combination of control points.
+    pub(crate) stencil: Vec<(u32, f64)>,
+    pub(crate) place: DVec3,
+    pub(crate) factor: f64,
+}
+
+impl Pull {
+    fn offset(&self, x: &[f64]) -> DVec3 {
+        let point = |v: u32| DVec3::from_slice(&x[3 * v as usize..]);
+        self.stencil.iter().map(|&(v, w)| w * point(v)).sum::<DVec3>() - self.place
+    }
+
+    /// The energy gained at control points `x`.
+    pub(crate) fn energy(&self, x: &[f64]) -> f64 {
+        self.factor * self.offset(x).length_squared()
+    }
+
+    /// The same; adds its gradient.
+    pub(crate) fn add_gradient(&self, x: &[f64], gradient: &mut [f64]) -> f64 {
+        let offset = self.offset(x);
+        for &(v, w) in &self.stencil {
+            for (c, d) in offset.to_array().into_iter().enumerate() {
+                gradient[3 * v as usize + c] += 2.0 * self.factor * w * d;
+            }
+        }
+        self.factor * offset.length_squared()
+    }
+}
+
+/// Places and weights of the pulled limit points of the input surface.
+pub(crate) fn pulled_places(
+    constraints: &Constraints,
+    mesh: &PolyMesh,
+    surface: &SubdivisionSurface,
+    area: f64,
+) -> Vec<(u32, DVec3, f64)> {
+    if constraints.weights.is_empty() {
+        return Vec::new();
+    }
+    let frames = limit_frames(mesh, surface);
+    let pulled = |&(v, weight): &(u32, f64)| {
+        let frame = frames[VertexId(v).index()].as_ref()?;
+        Some((v, frame.point(mesh.positions()), weight / area))
+    };
+    constraints.weights.iter().filter_map(pulled).collect()
+}
+
+/// The pulls on one level; vertices keep their numbers when a mesh is refined.
+pub(crate) fn pulls(
+    places: &[(u32, DVec3, f64)],
+    mesh: &PolyMesh,
+    surface: &SubdivisionSurface,
+) -> Vec<Pull> {
+    if places.is_empty() {
+        return Vec::new();
+    }
+    let frames = limit_frames(mesh, surface);
+    let pull = |&(v, place, factor): &(u32, DVec3, f64)| {
+        let stencil = frames[VertexId(v).index()].as_ref()?.position.clone();
+        Some(Pull { stencil, place, factor })
+    };
+    places.iter().filter_map(pull).collect()
 }
 
 /// One linear condition on the unknowns, `row · y = target`, as a dense row.

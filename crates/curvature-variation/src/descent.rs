@@ -1,6 +1,6 @@
 //! Minimisation on one level: L-BFGS with several metrics, Gauss-Newton, linear conditions.
 
-use crate::constraints::LinearRow;
+use crate::constraints::{LinearRow, Pull};
 use crate::evaluator::{SurfaceEnergy, Workspace};
 use crate::freedom::Freedom;
 use crate::functional::{Energy, ROOT_EPSILON};
@@ -41,6 +41,7 @@ pub(crate) struct Level<'a> {
     pub(crate) metric: Option<MetricAssembly>,
     /// Conditions that hold at the start already.
     pub(crate) rows: Vec<LinearRow>,
+    pub(crate) pulls: Vec<Pull>,
     /// Whether the surface may be scaled.
     pub(crate) scale_free: bool,
     /// Coefficient of the barrier against colliding parameter lines.
@@ -166,8 +167,16 @@ impl Level<'_> {
             &mut self.work,
             &mut full,
         );
+        let pulled: f64 = self.pulls.iter().map(|p| p.add_gradient(&self.x, &mut full)).sum();
         self.freedom.pull_back(&full, gradient);
-        value
+        value + pulled
+    }
+
+    /// The energy with its pulls at the present unknowns.
+    pub(crate) fn energy(&mut self) -> f64 {
+        self.freedom.expand(&self.y, &mut self.x);
+        let pulled: f64 = self.pulls.iter().map(|p| p.energy(&self.x)).sum();
+        self.evaluator.energy(self.energy, &self.x, &mut self.work) + pulled
     }
 
     /// Scales the surface to unit area, if that is allowed.

@@ -1,6 +1,8 @@
 //! Fairing a subdivision surface: levels, symmetry, constraints, report.
 
-use crate::constraints::{Constraints, boundary_band, linear_rows, refine_fixed};
+use crate::constraints::{
+    Constraints, boundary_band, linear_rows, pulled_places, pulls, refine_fixed,
+};
 use crate::descent::{Level, Method};
 use crate::evaluator::{EnergyTable, SurfaceEnergy, Workspace, flatten, unflatten};
 use crate::freedom::Freedom;
@@ -8,7 +10,7 @@ use crate::functional::{Energy, Functional};
 use crate::metric::MetricAssembly;
 use crate::rules::Quadrature;
 use crate::symmetry::SymmetryGroup;
-use geom_core::{DMat3, MeshError, PolyMesh, VertexId};
+use geom_core::{DMat3, DVec3, MeshError, PolyMesh, VertexId};
 use gp_solver::{SolverError, Status};
 use serde::{Deserialize, Serialize};
 use std::ops::ControlFlow;
@@ -89,6 +91,8 @@ pub enum FairError {
         "{energy} changes with the size of the surface, which is free: it would shrink to a point or grow for ever; fix some vertices or limit points, or use scale-invariant terms alone"
     )]
     ScaleFree { energy: String },
+    #[error("vertex {vertex} is pulled with weight {weight}; give a number from 0 up")]
+    Weight { vertex: u32, weight: f64 },
     #[error("the energy has no term with a weight other than zero")]
     NoEnergy,
     #[error("the energy is not finite at the start; the control mesh has folds or collapsed faces")]
@@ -146,11 +150,11 @@ pub struct LevelReport {
     pub factorizations: usize,
     /// Stored values of the factor.
     pub factor_len: usize,
-    /// Energy before and after.
+    /// The energy with the pulls of [`Constraints::weights`] before.
     pub initial_energy: f64,
-    /// Energy of the result.
+    /// The same of the result.
     pub final_energy: f64,
-    /// Energies of all steps.
+    /// The same of all steps.
     pub history: Vec<f64>,
     /// Seconds, tables and symmetry search included.
     pub seconds: f64,
@@ -191,6 +195,8 @@ pub struct FairReport {
 pub struct Fairing {
     /// The first level's control mesh before anything moved: quads, refined as far as needed.
     pub initial: PolyMesh,
+    /// Its surface.
+    pub initial_surface: SubdivisionSurface,
     /// The control mesh of the result.
     pub mesh: PolyMesh,
     /// The creases of the result.
@@ -249,6 +255,7 @@ pub fn fair(
     let initial_surface = SubdivisionSurface::new(&initial, &creases, options.blend)?;
     let before = energies(&initial, &initial_surface, constraints, options.quadrature);
     let area = before.get(Functional::Area);
+    let places = pulled_places(constraints, &initial, &initial_surface, area);
     let mut levels = Vec::new();
     let mut gradient_norm = f64::NAN;
     let mut interrupted = false;
@@ -276,6 +283,7 @@ pub fn fair(
             &creases,
             &fixed,
             constraints,
+            &places,
             options,
             level,
             area,
@@ -287,7 +295,7 @@ pub fn fair(
     }
     let surface = SubdivisionSurface::new(&mesh, &creases, options.blend)?;
     let report = finished(&mesh, &surface, constraints, options, before, levels, gradient_norm);
-    Ok(Fairing { initial, mesh, creases, surface, report })
+    Ok(Fairing { initial, initial_surface, mesh, creases, surface, report })
 }
 
 /// The report of a minimisation: all energies of the result, and what checks them.
@@ -307,7 +315,7 @@ pub(crate) fn finished(
     let quadrature_gap = if difference == 0.0 { 0.0 } else { difference / energy_final.abs() };
     let status = levels.last().map_or(Status::Interrupted, |l| l.status);
     let extrapolated = match &levels[..] {
-        [.., a, b] if status != Status::Interrupted => {
+        [.., a, b] if status != Status::Interrupted && constraints.weights.is_empty() => {
             Some(energy_final - (a.final_energy - b.final_energy) / 3.0)
         }
         _ => None,
@@ -349,12 +357,17 @@ pub(crate) fn check_input(
         let (vertex, count) = (v as usize, mesh.vertex_count());
         return Err(FairError::NoSuchVertex { vertex, count });
     }
+    if let Some(&(vertex, weight)) =
+        constraints.weights.iter().find(|w| !(w.1 >= 0.0 && w.1.is_finite()))
+    {
+        return Err(FairError::Weight { vertex, weight });
+    }
     let energy = &options.energy;
     if energy.terms.iter().all(|t| t.0 == 0.0) {
         return Err(FairError::NoEnergy);
     }
     let held = !constraints.vertices.is_empty()
-        || constraints.limit_points.len() > 1
+        || constraints.limit_points.len() + constraints.weights.len() > 1
         || (constraints.clamp_boundary && !mesh.boundary_loops().is_empty());
     if !energy.is_scale_invariant() && !held {
         return Err(FairError::ScaleFree { energy: energy.to_string() });
@@ -367,6 +380,7 @@ fn minimise_level(
     creases: &Creases,
     fixed: &[bool],
     constraints: &Constraints,
+    places: &[(u32, DVec3, f64)],
     options: &FairOptions,
     level: usize,
     area: f64,
@@ -382,10 +396,10 @@ fn minimise_level(
         return Err(FairError::NothingFree { vertices: mesh.vertex_count() });
     }
     let surface = SubdivisionSurface::new(mesh, creases, options.blend)?;
-    let pinned = !constraints.limit_points.is_empty() || !constraints.tangent_planes.is_empty();
-    // Limit conditions and creases are not checked for symmetry, so they switch it off.
+    let pinned = constraints.concern_limits();
+    // Conditions on the limit surface are not checked for symmetry, so they switch it off.
     let group = match &options.symmetry {
-        _ if pinned || *creases != Creases::none() => SymmetryGroup::trivial(mesh),
+        _ if pinned => SymmetryGroup::trivial(mesh),
         SymmetryMode::None => SymmetryGroup::trivial(mesh),
         SymmetryMode::Auto => SymmetryGroup::detect(mesh).keeping(&fixed),
         SymmetryMode::Declared(rows) => {
@@ -393,7 +407,8 @@ fn minimise_level(
                 rows.iter().map(|m| DMat3::from_cols_array_2d(m).transpose()).collect();
             SymmetryGroup::detect(mesh).restricted_to(&matrices).keeping(&fixed)
         }
-    };
+    }
+    .keeping_creases(mesh, creases);
     let freedom = Freedom::new(mesh.positions(), &fixed, &group);
     let mut multiplicities = group.face_multiplicities();
     if constraints.clamp_boundary {
@@ -406,9 +421,10 @@ fn minimise_level(
         &multiplicities,
     );
     let rows = linear_rows(constraints, mesh, &surface, &freedom);
+    let pulls = pulls(places, mesh, &surface);
     let metric = match options.method {
         Method::Lbfgs if rows.is_empty() => None,
-        _ => Some(MetricAssembly::new(&surface, &evaluator, &freedom)?),
+        _ => Some(MetricAssembly::new(&surface, &evaluator, &freedom, &pulls)?),
     };
     let factor_len = metric.as_ref().map_or(0, MetricAssembly::factor_len);
     let x = flatten(mesh.positions());
@@ -419,6 +435,7 @@ fn minimise_level(
         energy: &options.energy,
         metric,
         rows,
+        pulls,
         scale_free,
         barrier: 0.0,
         y: freedom.restrict(&x),
@@ -426,8 +443,7 @@ fn minimise_level(
         work: Workspace::default(),
     };
     state.meet_conditions()?;
-    freedom.expand(&state.y, &mut state.x);
-    let initial_energy = evaluator.energy(&options.energy, &state.x, &mut state.work);
+    let initial_energy = state.energy();
     if !initial_energy.is_finite() {
         return Err(FairError::Singular);
     }
@@ -451,9 +467,8 @@ fn minimise_level(
         // Back to the size of the input, about the same centre.
         let scale = (area / evaluator.area(&state.x, &mut state.work)).sqrt();
         state.y.iter_mut().for_each(|y| *y *= scale);
-        freedom.expand(&state.y, &mut state.x);
     }
-    let final_energy = evaluator.energy(&options.energy, &state.x, &mut state.work);
+    let final_energy = state.energy();
     // The functionals but `gaussian` and `mean_curvature` are at least zero, so that only negative
     // weights reach down here.
     if final_energy.is_nan() || final_energy < -UNBOUNDED * (1.0 + initial_energy.abs()) {

@@ -116,7 +116,8 @@ pub fn fair_in_family(
         vec![level],
         solved.gradient_norm,
     );
-    Ok(Fairing { initial: mesh, mesh: result, creases, surface, report })
+    let initial_surface = surface.clone();
+    Ok(Fairing { initial: mesh, initial_surface, mesh: result, creases, surface, report })
 }
 
 /// The energy as a function of the members' shares.

@@ -32,11 +32,14 @@ mod fair;
 mod family;
 mod freedom;
 mod functional;
+#[cfg(test)]
+mod independent;
 mod kernel;
 mod lanes;
 mod metric;
 mod rules;
 mod samples;
+mod splines;
 mod symmetry;
 
 pub use analysis::{SurfaceAnalysis, analyze, fitted_torus};
@@ -52,3 +55,4 @@ pub use family::fair_in_family;
 pub use functional::{Energy, Functional};
 pub use rules::Quadrature;
 pub use samples::{SurfaceSamples, Umbilic};
+pub use splines::{SplinePatchError, SplinePatches, spline_patches};

@@ -1,7 +1,8 @@
 //! Metrics for the descent: the Gauss-Newton Hessian and a Sobolev norm, assembled and factored.
 
+use crate::constraints::Pull;
 use crate::density::{Density, Derivatives, FrameAdjoint, Shape};
-use crate::evaluator::{Group, Rule, SurfaceEnergy};
+use crate::evaluator::{Group, SurfaceEnergy};
 use crate::freedom::Freedom;
 use crate::lanes::Lanes;
 use crate::rules::{MAX_LANES, Table};
@@ -35,6 +36,8 @@ pub(crate) struct MetricAssembly {
     // For every ordered pair of a patch's control points and every unknown of the second one, where
     // the first unknown of the first one stands; patch after patch.
     slots: Vec<u32>,
+    // What the pulls add: constant, so kept as slots and values.
+    pulls: Vec<(u32, f64)>,
 }
 
 impl MetricAssembly {
@@ -46,16 +49,14 @@ impl MetricAssembly {
         surface: &SubdivisionSurface,
         evaluator: &SurfaceEnergy,
         freedom: &Freedom,
+        pulls: &[Pull],
     ) -> Result<Self, SolverError> {
         let tables = evaluator
             .groups()
             .par_iter()
             .map(|group| {
-                let nodes = if matches!(group.rule, Rule::Separable(_)) {
-                    REGULAR_NODES
-                } else {
-                    EXTRAORDINARY_NODES
-                };
+                let bicubic = surface.b_spline_grid(group.basis).is_some();
+                let nodes = if bicubic { REGULAR_NODES } else { EXTRAORDINARY_NODES };
                 Table::new(surface, group.basis, nodes)
             })
             .collect();
@@ -69,8 +70,14 @@ impl MetricAssembly {
             (0..freedom.dim[b] as usize)
                 .flat_map(move |j| (0..freedom.dim[a] as usize).map(move |i| (i0 + i, j0 + j)))
         });
-        let pattern = SymmetricPattern::new(freedom.len(), entries)?;
+        let pulls = pull_entries(freedom, pulls);
+        let pulled = pulls.iter().map(|&(at, _)| at);
+        let pattern = SymmetricPattern::new(freedom.len(), entries.chain(pulled))?;
         drop(pairs);
+        let pulls = pulls
+            .iter()
+            .map(|&((i, j), value)| (pattern.slot(i, j).unwrap_or(0) as u32, value))
+            .collect();
         let mut slots = Vec::new();
         for_pairs(evaluator.groups(), freedom, |a, b| {
             let (i0, j0) = (freedom.start[a] as usize, freedom.start[b] as usize);
@@ -81,12 +88,18 @@ impl MetricAssembly {
             }
         });
         slots.shrink_to_fit();
-        Ok(Self { tables, cholesky: SparseCholesky::new(pattern)?, slots })
+        Ok(Self { tables, cholesky: SparseCholesky::new(pattern)?, slots, pulls })
     }
 
     /// Number of stored values of the factor.
     pub(crate) fn factor_len(&self) -> usize {
         self.cholesky.factor_len()
+    }
+
+    /// Structure of the matrix.
+    #[cfg(test)]
+    pub(crate) fn pattern(&self) -> &SymmetricPattern {
+        self.cholesky.pattern()
     }
 
     /// Assembles and factors the metric at `positions`.
@@ -101,6 +114,26 @@ impl MetricAssembly {
         area: f64,
         mixture: &Mixture,
     ) -> Result<(), SolverError> {
+        let mut values = self.assemble(evaluator, freedom, positions, area, mixture);
+        // Keeps unknowns that nothing sees from making the matrix singular.
+        let starts = self.cholesky.pattern().column_starts();
+        let size = freedom.len();
+        let trace: f64 = (0..size).map(|j| values[starts[j]]).sum();
+        for j in 0..size {
+            values[starts[j]] += 1e-12 * trace / size as f64;
+        }
+        self.cholesky.factor(&values)
+    }
+
+    /// The values of the matrix.
+    pub(crate) fn assemble(
+        &self,
+        evaluator: &SurfaceEnergy,
+        freedom: &Freedom,
+        positions: &[f64],
+        area: f64,
+        mixture: &Mixture,
+    ) -> Vec<f64> {
         let mut values = vec![0.0; self.cholesky.pattern().len()];
         let mut next_slot = 0;
         let mean_area = area / evaluator.weighted_patches();
@@ -137,14 +170,10 @@ impl MetricAssembly {
                 }
             }
         }
-        // Keeps unknowns that nothing sees from making the matrix singular.
-        let starts = self.cholesky.pattern().column_starts();
-        let size = freedom.len();
-        let trace: f64 = (0..size).map(|j| values[starts[j]]).sum();
-        for j in 0..size {
-            values[starts[j]] += 1e-12 * trace / size as f64;
+        for &(slot, value) in &self.pulls {
+            values[slot as usize] += value;
         }
-        self.cholesky.factor(&values)
+        values
     }
 
     pub(crate) fn solve_in_place(&self, rhs: &mut [f64]) {
@@ -213,6 +242,25 @@ fn for_pairs(groups: &[Group], freedom: &Freedom, mut visit: impl FnMut(usize, u
             }
         }
     }
+}
+
+/// Hessian of the pulls, lower triangle, as `((row, column), value)`.
+fn pull_entries(freedom: &Freedom, pulls: &[Pull]) -> Vec<((usize, usize), f64)> {
+    let unknowns = |&(v, w): &(u32, f64)| {
+        let v = v as usize;
+        (0..freedom.dim[v] as usize)
+            .map(move |k| (freedom.start[v] as usize + k, w * freedom.frame[v].col(k)))
+    };
+    let mut out = Vec::new();
+    for pull in pulls {
+        let all: Vec<_> = pull.stencil.iter().flat_map(unknowns).collect();
+        for &(i, a) in &all {
+            for &(j, b) in all.iter().filter(|(j, _)| *j <= i) {
+                out.push(((i, j), 2.0 * pull.factor * a.dot(b)));
+            }
+        }
+    }
+    out
 }
 
 fn element_width(per_patch: usize) -> usize {

@@ -1,6 +1,7 @@
 //! Symmetries of a control mesh, so that one fundamental domain is enough.
 
-use geom_core::{DMat3, DVec3, HalfEdgeId, PolyMesh};
+use geom_core::{DMat3, DVec3, HalfEdgeId, PolyMesh, VertexId};
+use subdiv_catmull_clark::Creases;
 
 /// Relative to the size of the mesh: how far a vertex may be from the image of another.
 const TOLERANCE: f64 = 1e-6;
@@ -62,7 +63,7 @@ impl SymmetryGroup {
         };
         let search =
             Search { mesh, points: &points, valence: &valence, tolerance: TOLERANCE * size };
-        let Some(first) = mesh.outgoing(geom_core::VertexId(seed as u32)) else { return trivial };
+        let Some(first) = mesh.outgoing(VertexId(seed as u32)) else { return trivial };
         let mut elements = Vec::new();
         for v in mesh.vertices() {
             // Kinds are rounded, so neighbours of the same class are let in too.
@@ -101,6 +102,19 @@ impl SymmetryGroup {
     pub(crate) fn keeping(mut self, marked: &[bool]) -> Self {
         self.elements.retain(|s| {
             s.vertices.iter().enumerate().all(|(v, &w)| marked[v] == marked[w as usize])
+        });
+        self
+    }
+
+    /// Drops the elements that do not map creases to creases of the same sharpness and corners to
+    /// corners.
+    pub(crate) fn keeping_creases(mut self, mesh: &PolyMesh, creases: &Creases) -> Self {
+        self.elements.retain(|s| {
+            let image = |v: VertexId| VertexId(s.vertices[v.index()]);
+            mesh.edges().all(|h| {
+                let (a, b) = (mesh.origin(h), mesh.target(h));
+                creases.sharpness(a, b) == creases.sharpness(image(a), image(b))
+            }) && mesh.vertices().all(|v| creases.is_corner(v) == creases.is_corner(image(v)))
         });
         self
     }
@@ -201,7 +215,7 @@ impl Search<'_> {
         let mut faces = Vec::with_capacity(mesh.face_count());
         for f in mesh.faces() {
             let h = mesh.face_half_edge(f);
-            let id = |v: geom_core::VertexId| geom_core::VertexId(vertices[v.index()]);
+            let id = |v: VertexId| VertexId(vertices[v.index()]);
             let g = mesh.half_edge_between(id(mesh.origin(h)), id(mesh.target(h)))?;
             let third = id(mesh.target(mesh.next(h)));
             // A mirror image lies on the other side.

@@ -144,6 +144,60 @@ fn pinned_limit_points_and_tangent_planes_are_met() {
 }
 
 #[test]
+fn weights_pull_limit_points_to_their_places() {
+    let mesh = quad_graphs::ellipsoid(3, DVec3::new(1.0, 1.4, 2.0));
+    // The point farthest out, which bending draws inwards.
+    let far = mesh.vertices().max_by(|&a, &b| {
+        let z = |v: geom_core::VertexId| mesh.positions()[v.index()].z;
+        z(a).total_cmp(&z(b))
+    });
+    let far = far.expect("a vertex");
+    let distance = |weight: f64| {
+        let constraints =
+            Constraints { weights: vec![(far.0, weight), (0, 1.0)], ..Constraints::default() };
+        let result = run(&mesh, &constraints, &options("bending", 0));
+        let point = |mesh: &PolyMesh, surface| {
+            let frames = limit_frames(mesh, surface);
+            frames[far.index()].as_ref().expect("a used vertex").point(mesh.positions())
+        };
+        point(&result.mesh, &result.surface)
+            .distance(point(&result.initial, &result.initial_surface))
+    };
+    let distances = [1.0, 100.0, 1e4].map(distance);
+    assert!(
+        distances[0] > 3.0 * distances[1] && distances[1] > 30.0 * distances[2],
+        "{distances:?}"
+    );
+    let constraints = Constraints { weights: vec![(0, -1.0)], ..Constraints::default() };
+    assert!(matches!(
+        refusal(&mesh, &constraints, &options("bending", 0)),
+        FairError::Weight { vertex: 0, .. }
+    ));
+}
+
+#[test]
+fn creases_stay_and_keep_the_symmetries_that_keep_them() {
+    let mesh = quad_graphs::ellipsoid(4, DVec3::new(1.0, 1.0, 0.6));
+    let flat = |v: geom_core::VertexId| mesh.positions()[v.index()].z.abs() < 1e-9;
+    for sharpness in [f64::INFINITY, 1.5] {
+        let mut creases = Creases::none();
+        for h in mesh.edges().filter(|&h| flat(mesh.origin(h)) && flat(mesh.target(h))) {
+            creases.set(mesh.origin(h), mesh.target(h), sharpness);
+        }
+        let result = fair(
+            &mesh,
+            &creases,
+            &Constraints::default(),
+            &FairOptions { iterations: 40, ..options("bending", 1) },
+            |_| ControlFlow::Continue(()),
+        )
+        .expect("a surface that can be faired");
+        assert!(result.report.energy_final < result.report.energy_initial, "{sharpness}");
+        assert_eq!(result.report.levels[0].symmetries, 16, "{sharpness}");
+    }
+}
+
+#[test]
 fn refusals_say_what_and_how_to_mend() {
     let mesh = quad_graphs::theta_graph(3);
     let none = Constraints::default();

@@ -55,6 +55,61 @@ impl Creases {
     }
 }
 
+/// Creases as written in a file, by vertex numbers of the mesh.
+#[derive(Clone, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct CreaseList {
+    /// Edges by their ends, with their sharpness; [`INFINITE_SHARPNESS`] stays for ever.
+    pub edges: Vec<((u32, u32), f64)>,
+    /// Vertices that are interpolated.
+    pub corners: Vec<u32>,
+}
+
+/// Why a list of creases does not fit a mesh.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+#[expect(missing_docs, reason = "the messages spell out every field")]
+pub enum CreaseError {
+    /// Two vertices that no edge joins.
+    #[error("the mesh has no edge {a}–{b} to crease; name the two ends of an edge")]
+    NoEdge { a: u32, b: u32 },
+    /// A vertex number beyond the last.
+    #[error("the creases name vertex {vertex}, but there are only {count}, numbered from 0")]
+    NoVertex { vertex: u32, count: usize },
+    /// A sharpness that is negative or not a number.
+    #[error("edge {a}–{b} has sharpness {sharpness}; give a number from 0 up, or inf")]
+    Sharpness { a: u32, b: u32, sharpness: f64 },
+}
+
+impl CreaseList {
+    /// The creases, checked against a mesh.
+    ///
+    /// # Errors
+    /// [`CreaseError`] names the first entry at fault.
+    pub fn for_mesh(&self, mesh: &PolyMesh) -> Result<Creases, CreaseError> {
+        let count = mesh.vertex_count();
+        let known = |vertex: u32| {
+            let beyond = CreaseError::NoVertex { vertex, count };
+            if (vertex as usize) < count { Ok(VertexId(vertex)) } else { Err(beyond) }
+        };
+        let mut creases = Creases::none();
+        for &((a, b), sharpness) in &self.edges {
+            let (from, to) = (known(a)?, known(b)?);
+            if mesh.half_edge_between(from, to).is_none() {
+                return Err(CreaseError::NoEdge { a, b });
+            }
+            if !(sharpness >= 0.0) {
+                return Err(CreaseError::Sharpness { a, b, sharpness });
+            }
+            creases.set(from, to, sharpness);
+        }
+        for &v in &self.corners {
+            creases.set_corner(known(v)?);
+        }
+        Ok(creases)
+    }
+}
+
 /// What the masks need to know about a mesh besides its connectivity: sharpness and the mask of
 /// Biermann, Levin and Zorin (2000) per half-edge, corner marks per vertex.
 #[derive(Clone, Debug, PartialEq)]
@@ -169,4 +224,30 @@ pub(crate) struct VertexRule {
     pub(crate) now: VertexMask,
     pub(crate) next: VertexMask,
     pub(crate) weight: f64,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use geom_core::DVec3;
+
+    #[test]
+    fn lists_are_checked_against_the_mesh() {
+        let mesh =
+            PolyMesh::new(vec![DVec3::ZERO, DVec3::X, DVec3::ONE, DVec3::Y], &[[0, 1, 2, 3]])
+                .unwrap();
+        let list =
+            |a: u32, b: u32, s: f64| CreaseList { edges: vec![((a, b), s)], corners: vec![] };
+        assert_eq!(
+            list(0, 2, 1.0).for_mesh(&mesh).unwrap_err().to_string(),
+            "the mesh has no edge 0–2 to crease; name the two ends of an edge"
+        );
+        assert!(matches!(
+            list(0, 9, 1.0).for_mesh(&mesh),
+            Err(CreaseError::NoVertex { vertex: 9, count: 4 })
+        ));
+        assert!(matches!(list(0, 1, f64::NAN).for_mesh(&mesh), Err(CreaseError::Sharpness { .. })));
+        let creases = list(1, 0, f64::INFINITY).for_mesh(&mesh).unwrap();
+        assert_eq!(creases.sharpness(VertexId(0), VertexId(1)), INFINITE_SHARPNESS);
+    }
 }

@@ -37,7 +37,7 @@ mod surface;
 
 pub use blend::{Blend, flat_step, septic_step};
 pub use characteristic::{LimitMasks, limit_masks, subdominant_eigenvalue};
-pub use crease::{Creases, INFINITE_SHARPNESS};
+pub use crease::{CreaseError, CreaseList, Creases, INFINITE_SHARPNESS};
 pub use jet::{JET_LEN, JET_ORDERS, Jet, JetWeights, cubic_basis, jet_product};
 pub use limit::{LimitFrame, limit_frames};
 pub use refine::{Refined, Stencils, refine};
