@@ -116,7 +116,8 @@ impl Fair {
         let settings = self.settings.over(self.config.load()?);
         let family = settings.family.clone().unwrap_or_default();
         let Resolved { options, constraints, creases: listed } = settings.resolve()?;
-        if !family.is_empty() && !(constraints.is_empty() && listed.is_none()) {
+        let held = !constraints.is_empty() || listed.is_some();
+        if held && !family.is_empty() {
             return Err(Failure::usage(
                 "--family leaves no vertex to fix; drop --fix, --creases and --clamp-boundary",
             ));

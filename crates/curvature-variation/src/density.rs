@@ -98,10 +98,24 @@ pub(crate) struct Shape<S: Simd> {
 }
 
 /// Adjoints of the frame quantities a density depends on.
+#[derive(Clone, Copy)]
 pub(crate) struct FrameAdjoint<S: Simd> {
     pub(crate) harmonics: [Lanes<S>; 4],
     pub(crate) second: [Lanes<S>; 3],
     pub(crate) area: Lanes<S>,
+}
+
+impl<S: Simd> FrameAdjoint<S> {
+    /// All adjoints times one factor.
+    #[inline(always)]
+    pub(crate) fn scaled(&self, factor: Lanes<S>) -> Self {
+        let ([a, b, c, d], [l, m, q]) = (self.harmonics, self.second);
+        Self {
+            harmonics: [a * factor, b * factor, c * factor, d * factor],
+            second: [l * factor, m * factor, q * factor],
+            area: self.area * factor,
+        }
+    }
 }
 
 /// Quadratic form on `(u, v)` in the frame `e1 = al S_u`, `e2 = be S_u + ga S_v`.
@@ -112,6 +126,30 @@ fn to_frame<S: Simd>(al: Lanes<S>, be: Lanes<S>, ga: Lanes<S>, r: &[Lanes<S>; 3]
     [al * al * r[0], al * first, be.fma(first, ga * second)]
 }
 
+/// Adjoint of [`to_frame`]: adjoints of `r`, and what is added to those of `al`, `be`, `ga`.
+#[inline(always)]
+fn to_frame_adjoint<S: Simd>(
+    [al, be, ga]: [Lanes<S>; 3],
+    r: &[Lanes<S>; 3],
+    o: &[Lanes<S>; 3],
+    sums: &mut [Lanes<S>; 3],
+) -> [Lanes<S>; 3] {
+    let first = be.fma(r[0], ga * r[1]);
+    let second = be.fma(r[1], ga * r[2]);
+    let twice = o[2] * 2.0;
+    let (a0, a1) = (al * r[0], al * r[1]);
+    sums[0] = sums[0] + (a0 * o[0]) * 2.0 + first * o[1];
+    sums[1] = sums[1] + a0.fma(o[1], twice * first);
+    sums[2] = sums[2] + a1.fma(o[1], twice * second);
+    [
+        (al * al).fma(o[0], (al * be).fma(o[1], be * be * o[2])),
+        ga * al.fma(o[1], be * twice),
+        ga * ga * o[2],
+    ]
+}
+
+// Closures and the adaptors of arrays are compiled without the caller's instruction set and then
+// not inlined, which makes every operation in them a call; the kernels spell such loops out.
 impl<S: Simd> Shape<S> {
     #[inline(always)]
     pub(crate) fn new(d: &Derivatives<S>) -> Self {
@@ -185,26 +223,15 @@ impl<S: Simd> Shape<S> {
         let t3 = be.fma(h[2], ga * h[3]);
         let s1 = be.fma(t1, ga * t2);
         let s2 = be.fma(t2, ga * t3);
-        let mut alb = al2.fma(h[0] * a3, al.fma(t1 * b2, s1 * c));
-        let mut beb = al2.fma(h[0] * b, al.fma(t1 * c2, s1 * w3));
-        let mut gab = al2.fma(h[1] * b, al.fma(t2 * c2, s2 * w3));
-        // Adjoint of `to_frame` for each of the three forms.
-        let mut back = |r: &[Lanes<S>; 3], o: &[Lanes<S>; 3]| {
-            let first = be.fma(r[0], ga * r[1]);
-            let second = be.fma(r[1], ga * r[2]);
-            let twice = o[2] * 2.0;
-            alb = alb + (al * r[0] * o[0]) * 2.0 + first * o[1];
-            beb = beb + (al * r[0]).fma(o[1], twice * first);
-            gab = gab + (al * r[1]).fma(o[1], twice * second);
-            [
-                al2.fma(o[0], (al * be).fma(o[1], be2 * o[2])),
-                ga * al.fma(o[1], be * twice),
-                ga2 * o[2],
-            ]
-        };
-        let pb = back(&self.p, &ob);
-        let xb = back(&self.x, &xb);
-        let yb = back(&self.y, &yb);
+        let mut frame = [
+            al2.fma(h[0] * a3, al.fma(t1 * b2, s1 * c)),
+            al2.fma(h[0] * b, al.fma(t1 * c2, s1 * w3)),
+            al2.fma(h[1] * b, al.fma(t2 * c2, s2 * w3)),
+        ];
+        let pb = to_frame_adjoint([al, be, ga], &self.p, &ob, &mut frame);
+        let xb = to_frame_adjoint([al, be, ga], &self.x, &xb, &mut frame);
+        let yb = to_frame_adjoint([al, be, ga], &self.y, &yb, &mut frame);
+        let [mut alb, mut beb, mut gab] = frame;
         let mut out = *d;
         let mut nb = scaled(&d[5], hb[0]);
         let mut e1b = scaled(&d[2], xb[0]);
@@ -309,7 +336,7 @@ impl<S: Simd> Shape<S> {
             area = area - barrier * self.inv_area;
         }
         let adjoint = FrameAdjoint {
-            harmonics: harmonics.map(|x| x * j),
+            harmonics: [harmonics[0] * j, harmonics[1] * j, harmonics[2] * j, harmonics[3] * j],
             second: [lb * j, mb * j, qb * j],
             area,
         };

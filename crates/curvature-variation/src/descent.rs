@@ -28,6 +28,9 @@ pub enum Method {
 const DAMPING: f64 = 1e-3;
 /// Steps between two factorisations.
 const REFRESH: usize = 40;
+/// A round with a Gauss-Newton metric ends once the gain that the metric foresees is this share of
+/// the tolerance.
+const SETTLED: f64 = 0.01;
 /// Steps L-BFGS remembers.
 const MEMORY: usize = 20;
 /// Share of the energy that the barrier costs on an evenly parametrised surface.
@@ -296,8 +299,11 @@ impl Level<'_> {
                 // The thesis keeps ten steps and never stops for a new metric.
                 Method::Lbfgs => (left, MEMORY / 2),
             };
-            let (before, after) =
+            let (before, after, settled) =
                 self.round(method, left.min(steps), memory, tolerance, &mut total, observer)?;
+            if settled {
+                break;
+            }
             if total.status == Status::Stalled && before - after > tolerance * after.abs() {
                 continue;
             }
@@ -311,6 +317,8 @@ impl Level<'_> {
         Ok(total)
     }
 
+    /// One run of L-BFGS with a metric that stays; energies before and after, and whether there is
+    /// nothing left to gain.
     fn round(
         &mut self,
         method: Method,
@@ -319,7 +327,7 @@ impl Level<'_> {
         tolerance: f64,
         total: &mut Descent,
         observer: &mut dyn FnMut(usize, f64) -> ControlFlow<()>,
-    ) -> Result<(f64, f64), SolverError> {
+    ) -> Result<(f64, f64, bool), SolverError> {
         let rows = self.condition_rows();
         let epsilon_area = self.area();
         let metric = self.metric.take();
@@ -334,6 +342,10 @@ impl Level<'_> {
         };
         let mut y = std::mem::take(&mut self.y);
         let start = total.iterations;
+        // With a Gauss-Newton metric half the squared norm of the gradient estimates what is left
+        // to gain; without this test steps would go on down to the rounding errors.
+        let newton_like = method == Method::LaggedGaussNewton;
+        let mut settled = false;
         let report = {
             let mut objective = |at: &[f64], gradient: &mut [f64]| {
                 self.y.clear();
@@ -344,7 +356,10 @@ impl Level<'_> {
                 if seen.iteration == 0 {
                     return ControlFlow::Continue(());
                 }
-                observer(start + seen.iteration, seen.energy)
+                observer(start + seen.iteration, seen.energy)?;
+                let left = 0.5 * seen.gradient_norm * seen.gradient_norm;
+                settled = newton_like && left <= SETTLED * tolerance * seen.energy.abs();
+                if settled { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
             })
         };
         drop(projected);
@@ -355,8 +370,8 @@ impl Level<'_> {
         total.evaluations += report.evaluations;
         total.history.extend(&report.history);
         total.gradient_norm = report.gradient_norm;
-        total.status = report.status;
-        Ok((report.initial_energy, report.final_energy))
+        total.status = if settled { Status::Converged } else { report.status };
+        Ok((report.initial_energy, report.final_energy, settled))
     }
 
     /// Gauss-Newton steps damped by the Sobolev norm, until a step gains less than `tolerance` of

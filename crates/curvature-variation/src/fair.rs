@@ -127,6 +127,9 @@ const UNBOUNDED: f64 = 1e6;
 const FIRST_NEWTON_STEPS: usize = 25;
 const LATER_NEWTON_STEPS: usize = 4;
 
+/// How much larger the tolerance of the levels before the last two is.
+const COARSE_TOLERANCE: f64 = 100.0;
+
 /// What happened on one level.
 #[derive(Clone, Debug, PartialEq)]
 pub struct LevelReport {
@@ -448,13 +451,12 @@ fn minimise_level(
         return Err(FairError::Singular);
     }
     let newton_steps = if level == 0 { FIRST_NEWTON_STEPS } else { LATER_NEWTON_STEPS };
-    let descent = state.minimise(
-        options.method,
-        options.iterations,
-        newton_steps,
-        options.tolerance,
-        observer,
-    );
+    // The next level moves the surface more than the last steps here would. The one before the last
+    // is driven on: Richardson's extrapolation stands on its energy.
+    let coarse = level + 1 < options.levels;
+    let tolerance = if coarse { COARSE_TOLERANCE } else { 1.0 } * options.tolerance;
+    let descent =
+        state.minimise(options.method, options.iterations, newton_steps, tolerance, observer);
     let descent = match descent {
         // Past all damping the Hessian is no longer finite.
         Err(SolverError::NotPositiveDefinite { .. }) => {

@@ -25,6 +25,10 @@ pub enum Functional {
     /// `∫ (k1 − k2)² dA` (Eq. 4.8).
     UmbilicDeviation,
     /// `A ∫ (dk1/de1)² + (dk2/de2)² dA` (Eq. 4.12).
+    ///
+    /// The density is `F1² + F3² + 2 Re(Z1 Z3 e^{4iφ})` with the angle `φ` of the first principal
+    /// direction; near umbilics the last term fades as `r²/(r² + 10⁻⁶ |II|²)`, `r = (k1 − k2)/2`,
+    /// so that an umbilic counts with the mean over all directions.
     Mvs,
     /// As `Mvs` with the cross derivatives `dk1/de2` and `dk2/de1` (Eq. 4.13).
     MvsCross,

@@ -1,7 +1,7 @@
 //! Energy, area and their gradients of one patch, a vector of samples at a time.
 
 use crate::density::{Density, Derivatives, Shape};
-use crate::lanes::{Lanes, Vec3};
+use crate::lanes::{Lanes, Vec3, scaled};
 use crate::rules::{SeparableRule, Table};
 use pulp::{Simd, WithSimd};
 
@@ -37,6 +37,13 @@ pub(crate) struct PatchRun<'a, R> {
     pub(crate) gradients: &'a mut [f64],
 }
 
+/// The patch's control points, together in one place.
+pub(crate) fn gather(positions: &[f64], controls: &[u32], points: &mut [[f64; 3]]) {
+    for (point, &v) in points.iter_mut().zip(controls) {
+        point.copy_from_slice(&positions[3 * v as usize..3 * v as usize + 3]);
+    }
+}
+
 #[inline(always)]
 fn zero<S: Simd>(simd: S) -> Vec3<S> {
     [Lanes::splat(simd, 0.0); 3]
@@ -66,17 +73,67 @@ fn sample<S: Simd>(d: &Derivatives<S>, weight: Lanes<S>, task: Task<'_>) -> Samp
         Task::Area => {}
         Task::Energy(density) => out.integral = shape.density(density).0 * weight,
         Task::Gradient(density) => {
-            let (value, mut adjoint) = shape.density(density);
+            let (value, adjoint) = shape.density(density);
             out.integral = value * weight;
-            adjoint.harmonics = adjoint.harmonics.map(|x| x * weight);
-            adjoint.second = adjoint.second.map(|x| x * weight);
-            adjoint.area = adjoint.area * weight;
-            out.adjoint = shape.pull_back(d, &adjoint);
-            out.area_adjoint =
-                shape.area_adjoint(d).map(|a| [a[0] * weight, a[1] * weight, a[2] * weight]);
+            out.adjoint = shape.pull_back(d, &adjoint.scaled(weight));
+            let [u, v] = shape.area_adjoint(d);
+            out.area_adjoint = [scaled(&u, weight), scaled(&v, weight)];
         }
     }
     out
+}
+
+/// The first `3 · groups` derivatives at one vector of samples, from the table's weights (which
+/// begin at `start`) and the control points.
+///
+/// Three derivatives at a time: nine sums hide the latency of the multiplications and still fit
+/// into registers, which sums that live in memory would not.
+#[inline(always)]
+pub(crate) fn table_derivatives<S: Simd>(
+    simd: S,
+    values: &[S::f64s],
+    (start, step): (usize, usize),
+    points: &[[f64; 3]],
+    groups: usize,
+) -> Derivatives<S> {
+    let count = points.len();
+    let mut d: Derivatives<S> = [zero(simd); 9];
+    for group in 0..groups {
+        let mut sums = [zero(simd); 3];
+        let begin = start + 3 * group * count * step;
+        let length = count * step;
+        let rows = &values[begin..begin + 3 * length - (step - 1)];
+        for (k, point) in points.iter().enumerate() {
+            let p = [
+                Lanes::splat(simd, point[0]),
+                Lanes::splat(simd, point[1]),
+                Lanes::splat(simd, point[2]),
+            ];
+            for (order, sum) in sums.iter_mut().enumerate() {
+                let t = Lanes(simd, rows[order * length + k * step]);
+                *sum = [t.fma(p[0], sum[0]), t.fma(p[1], sum[1]), t.fma(p[2], sum[2])];
+            }
+        }
+        d[3 * group..3 * group + 3].copy_from_slice(&sums);
+    }
+    d
+}
+
+/// Adjoint of control point `k` from those of the derivatives.
+#[inline(always)]
+pub(crate) fn table_adjoint<S: Simd>(
+    simd: S,
+    values: &[S::f64s],
+    (start, step): (usize, usize),
+    (k, count): (usize, usize),
+    adjoint: &Derivatives<S>,
+) -> Vec3<S> {
+    let mut sum = zero(simd);
+    for (order, a) in adjoint.iter().enumerate() {
+        let t = Lanes(simd, values[start + (order * count + k) * step]);
+        sum = [t.fma(a[0], sum[0]), t.fma(a[1], sum[1]), t.fma(a[2], sum[2])];
+    }
+    sum
 }
 
 impl WithSimd for PatchRun<'_, Table> {
@@ -88,40 +145,35 @@ impl WithSimd for PatchRun<'_, Table> {
         let rule = self.rule;
         let (values, _) = S::as_simd_f64s(&rule.values);
         let (weights, _) = S::as_simd_f64s(&rule.weights);
-        let chunks = weights.len();
         let with_gradient = matches!(self.task, Task::Gradient(_));
-        let mut sums = vec![zero(simd); if with_gradient { 2 * count } else { 0 }];
+        let mut sums = vec![[zero(simd); 2]; if with_gradient { count } else { 0 }];
+        let mut points = vec![[0.0; 3]; count];
+        let groups = if self.task == Task::Area { 1 } else { 3 };
         for (patch, integrals) in self.integrals.iter_mut().enumerate() {
             let controls = &self.controls[patch * count..(patch + 1) * count];
+            gather(self.positions, controls, &mut points);
             let mut area = Lanes::splat(simd, 0.0);
             let mut integral = area;
-            sums.fill(zero(simd));
+            sums.fill([zero(simd); 2]);
             for (chunk, &w) in weights.iter().enumerate() {
-                let mut d: Derivatives<S> = [zero(simd); 9];
-                let needed = if self.task == Task::Area { 2 } else { 9 };
-                for (order, out) in d[..needed].iter_mut().enumerate() {
-                    for (k, &v) in controls.iter().enumerate() {
-                        let t = Lanes(simd, values[(order * count + k) * chunks + chunk]);
-                        let p = &self.positions[3 * v as usize..3 * v as usize + 3];
-                        for c in 0..3 {
-                            out[c] = t.fma(Lanes::splat(simd, p[c]), out[c]);
-                        }
-                    }
-                }
+                let place = rule.chunk(chunk, S::F64_LANES);
+                let d = table_derivatives(simd, values, place, &points, groups);
                 let s = sample(&d, Lanes(simd, w), self.task);
                 area = area + s.area;
                 integral = integral + s.integral;
                 if with_gradient {
-                    for (k, sum) in sums.chunks_exact_mut(2).enumerate() {
-                        for (order, adjoint) in s.adjoint.iter().enumerate() {
-                            let t = Lanes(simd, values[(order * count + k) * chunks + chunk]);
-                            for c in 0..3 {
-                                sum[0][c] = t.fma(adjoint[c], sum[0][c]);
-                                if order < 2 {
-                                    sum[1][c] = t.fma(s.area_adjoint[order][c], sum[1][c]);
-                                }
-                            }
+                    let (start, step) = place;
+                    let [au, av] = s.area_adjoint;
+                    for (k, sum) in sums.iter_mut().enumerate() {
+                        let g = table_adjoint(simd, values, place, (k, count), &s.adjoint);
+                        let tu = Lanes(simd, values[start + k * step]);
+                        let tv = Lanes(simd, values[start + (count + k) * step]);
+                        let [mut now, mut now_area] = *sum;
+                        for c in 0..3 {
+                            now[c] = now[c] + g[c];
+                            now_area[c] = tu.fma(au[c], tv.fma(av[c], now_area[c]));
                         }
+                        *sum = [now, now_area];
                     }
                 }
             }
@@ -129,7 +181,7 @@ impl WithSimd for PatchRun<'_, Table> {
             if with_gradient {
                 let start = patch * count * GRADIENT_LEN;
                 let out = &mut self.gradients[start..start + count * GRADIENT_LEN];
-                for (g, sum) in out.chunks_exact_mut(GRADIENT_LEN).zip(sums.chunks_exact(2)) {
+                for (g, sum) in out.chunks_exact_mut(GRADIENT_LEN).zip(&sums) {
                     for c in 0..3 {
                         g[c] = sum[0][c].sum();
                         g[3 + c] = sum[1][c].sum();
@@ -158,71 +210,84 @@ impl WithSimd for PatchRun<'_, SeparableRule> {
                 Some(controls) => controls,
                 None => return,
             };
-            let point = |i: usize, j: usize| {
-                let v = 3 * controls[rule.order[4 * i + j]] as usize;
-                &self.positions[v..v + 3]
-            };
+            let mut points = [[0.0; 3]; 16];
+            for (point, &k) in points.iter_mut().zip(&rule.order) {
+                let v = 3 * controls[k] as usize;
+                point.copy_from_slice(&self.positions[v..v + 3]);
+            }
             let mut area = Lanes::splat(simd, 0.0);
             let mut integral = area;
             let mut out = [0.0; 16 * GRADIENT_LEN];
             for chunk in 0..chunks {
                 // Along v for every row of control points, then along u for every node.
                 let mut rows = [[zero(simd); 4]; 4];
-                for (order, row) in rows[..orders].iter_mut().enumerate() {
-                    for j in 0..4 {
-                        let t = Lanes(simd, basis[(4 * order + j) * lanes_per_row + chunk]);
-                        for (i, sum) in row.iter_mut().enumerate() {
-                            let p = point(i, j);
+                for order in 0..orders {
+                    for i in 0..4 {
+                        let mut sum = zero(simd);
+                        for j in 0..4 {
+                            let t = Lanes(simd, basis[(4 * order + j) * lanes_per_row + chunk]);
+                            let p = &points[4 * i + j];
                             for c in 0..3 {
                                 sum[c] = t.fma(Lanes::splat(simd, p[c]), sum[c]);
                             }
                         }
+                        rows[order][i] = sum;
                     }
                 }
                 let mut back = [[zero(simd); 4]; 4];
                 let mut area_back = [[zero(simd); 4]; 2];
                 for node in 0..rule.nodes {
-                    let at = |order: usize, i: usize| {
-                        Lanes::splat(simd, rule.basis[(4 * order + i) * rule.padded + node])
-                    };
+                    let mut at = [[Lanes::splat(simd, 0.0); 4]; 4];
+                    for (order, at) in at.iter_mut().enumerate() {
+                        for (i, at) in at.iter_mut().enumerate() {
+                            let value = rule.basis[(4 * order + i) * rule.padded + node];
+                            *at = Lanes::splat(simd, value);
+                        }
+                    }
                     let mut d: Derivatives<S> = [zero(simd); 9];
                     let needed = if self.task == Task::Area { 2 } else { 9 };
-                    for (k, sum) in d[..needed].iter_mut().enumerate() {
+                    for k in 0..needed {
+                        let mut sum = zero(simd);
                         for i in 0..4 {
-                            let t = at(ORDER_U[k], i);
+                            let (t, row) = (at[ORDER_U[k]][i], &rows[ORDER_V[k]][i]);
                             for c in 0..3 {
-                                sum[c] = t.fma(rows[ORDER_V[k]][i][c], sum[c]);
+                                sum[c] = t.fma(row[c], sum[c]);
                             }
                         }
+                        d[k] = sum;
                     }
                     let weight = Lanes(simd, weights[node * lanes_per_row + chunk]);
                     let s = sample(&d, weight, self.task);
                     area = area + s.area;
                     integral = integral + s.integral;
                     if with_gradient {
+                        // Collected by the order along v, so that each sum is touched once.
+                        let (a, [au, av]) = (&s.adjoint, &s.area_adjoint);
                         for i in 0..4 {
-                            for k in 0..9 {
-                                let t = at(ORDER_U[k], i);
-                                let sum = &mut back[ORDER_V[k]][i];
-                                for c in 0..3 {
-                                    sum[c] = t.fma(s.adjoint[k][c], sum[c]);
-                                }
-                            }
-                            for k in 0..2 {
-                                let t = at(ORDER_U[k], i);
-                                let sum = &mut area_back[ORDER_V[k]][i];
-                                for c in 0..3 {
-                                    sum[c] = t.fma(s.area_adjoint[k][c], sum[c]);
-                                }
+                            let t = [at[0][i], at[1][i], at[2][i], at[3][i]];
+                            for c in 0..3 {
+                                back[0][i][c] = t[1].fma(
+                                    a[0][c],
+                                    t[2].fma(a[2][c], t[3].fma(a[5][c], back[0][i][c])),
+                                );
+                                back[1][i][c] = t[0].fma(
+                                    a[1][c],
+                                    t[1].fma(a[3][c], t[2].fma(a[6][c], back[1][i][c])),
+                                );
+                                back[2][i][c] = t[0].fma(a[4][c], t[1].fma(a[7][c], back[2][i][c]));
+                                back[3][i][c] = t[0].fma(a[8][c], back[3][i][c]);
+                                area_back[0][i][c] = t[1].fma(au[c], area_back[0][i][c]);
+                                area_back[1][i][c] = t[0].fma(av[c], area_back[1][i][c]);
                             }
                         }
                     }
                 }
                 if with_gradient {
                     for j in 0..4 {
-                        let t: [Lanes<S>; 4] = std::array::from_fn(|order| {
-                            Lanes(simd, basis[(4 * order + j) * lanes_per_row + chunk])
-                        });
+                        let mut t = [Lanes::splat(simd, 0.0); 4];
+                        for (order, t) in t.iter_mut().enumerate() {
+                            *t = Lanes(simd, basis[(4 * order + j) * lanes_per_row + chunk]);
+                        }
                         for i in 0..4 {
                             let k = GRADIENT_LEN * rule.order[4 * i + j];
                             for c in 0..3 {

@@ -1,9 +1,10 @@
 //! Metrics for the descent: the Gauss-Newton Hessian and a Sobolev norm, assembled and factored.
 
 use crate::constraints::Pull;
-use crate::density::{Density, Derivatives, FrameAdjoint, Shape};
+use crate::density::{Density, FrameAdjoint, Shape};
 use crate::evaluator::{Group, SurfaceEnergy};
 use crate::freedom::Freedom;
+use crate::kernel::{gather, table_adjoint, table_derivatives};
 use crate::lanes::Lanes;
 use crate::rules::{MAX_LANES, Table};
 use gp_solver::{SolverError, SparseCholesky, SymmetricPattern};
@@ -29,9 +30,33 @@ pub(crate) struct Mixture {
     pub(crate) sobolev: f64,
 }
 
+/// A basis at the nodes of the metrics, also with one row per sample and derivative.
+struct MetricRule {
+    table: Table,
+    /// `rows[(9 s + d) · width + k]`, the width rounded up to whole vectors.
+    rows: Vec<f64>,
+}
+
+impl MetricRule {
+    fn new(table: Table) -> Self {
+        let width = table.controls.next_multiple_of(MAX_LANES);
+        let mut rows = vec![0.0; 9 * table.samples * width];
+        for s in 0..table.samples {
+            let (start, step) = table.chunk(s, 1);
+            for d in 0..9 {
+                for k in 0..table.controls {
+                    rows[(9 * s + d) * width + k] =
+                        table.values[start + (d * table.controls + k) * step];
+                }
+            }
+        }
+        Self { table, rows }
+    }
+}
+
 /// A metric on the unknowns, with the structure of its matrix worked out once.
 pub(crate) struct MetricAssembly {
-    tables: Vec<Table>,
+    rules: Vec<MetricRule>,
     cholesky: SparseCholesky,
     // For every ordered pair of a patch's control points and every unknown of the second one, where
     // the first unknown of the first one stands; patch after patch.
@@ -51,13 +76,13 @@ impl MetricAssembly {
         freedom: &Freedom,
         pulls: &[Pull],
     ) -> Result<Self, SolverError> {
-        let tables = evaluator
+        let rules = evaluator
             .groups()
             .par_iter()
             .map(|group| {
                 let bicubic = surface.b_spline_grid(group.basis).is_some();
                 let nodes = if bicubic { REGULAR_NODES } else { EXTRAORDINARY_NODES };
-                Table::new(surface, group.basis, nodes)
+                MetricRule::new(Table::new(surface, group.basis, nodes))
             })
             .collect();
         let mut pairs = Vec::new();
@@ -88,7 +113,7 @@ impl MetricAssembly {
             }
         });
         slots.shrink_to_fit();
-        Ok(Self { tables, cholesky: SparseCholesky::new(pattern)?, slots, pulls })
+        Ok(Self { rules, cholesky: SparseCholesky::new(pattern)?, slots, pulls })
     }
 
     /// Number of stored values of the factor.
@@ -137,7 +162,7 @@ impl MetricAssembly {
         let mut values = vec![0.0; self.cholesky.pattern().len()];
         let mut next_slot = 0;
         let mean_area = area / evaluator.weighted_patches();
-        for (group, table) in evaluator.groups().iter().zip(&self.tables) {
+        for (group, rule) in evaluator.groups().iter().zip(&self.rules) {
             let width = element_width(group.per_patch);
             for controls in group.controls.chunks(BATCH * group.per_patch) {
                 let mut matrices = vec![0.0; controls.len() / group.per_patch * width * width];
@@ -146,7 +171,7 @@ impl MetricAssembly {
                     .zip(controls.par_chunks(group.per_patch))
                     .for_each(|(matrix, controls)| {
                         evaluator.arch().dispatch(ElementMatrix {
-                            table,
+                            rule,
                             mixture,
                             positions,
                             controls,
@@ -269,7 +294,7 @@ fn element_width(per_patch: usize) -> usize {
 
 /// The matrix of one patch, upper triangle, rows padded to whole vectors.
 struct ElementMatrix<'a> {
-    table: &'a Table,
+    rule: &'a MetricRule,
     mixture: &'a Mixture,
     positions: &'a [f64],
     controls: &'a [u32],
@@ -285,25 +310,20 @@ impl WithSimd for ElementMatrix<'_> {
     fn with_simd<S: Simd>(self, simd: S) {
         let count = self.controls.len();
         let width = element_width(count);
-        let table = self.table;
+        let table = &self.rule.table;
         let (values, _) = S::as_simd_f64s(&table.values);
         let (weights, _) = S::as_simd_f64s(&table.weights);
-        let chunks = weights.len();
-        let zero = Lanes::splat(simd, 0.0);
+        let mut points = vec![[0.0; 3]; count];
+        gather(self.positions, self.controls, &mut points);
         let mut residuals = vec![0.0; MAX_LANES * 7 * width];
-        // Sums over samples of |∇ᵏ|² by order, for the Sobolev part.
-        let mut scalar = vec![0.0; count * count];
-        for chunk in 0..chunks {
-            let mut d: Derivatives<S> = [[zero; 3]; 9];
-            for (order, out) in d.iter_mut().enumerate() {
-                for (k, &v) in self.controls.iter().enumerate() {
-                    let t = Lanes(simd, values[(order * count + k) * chunks + chunk]);
-                    let p = &self.positions[3 * v as usize..3 * v as usize + 3];
-                    for c in 0..3 {
-                        out[c] = t.fma(Lanes::splat(simd, p[c]), out[c]);
-                    }
-                }
-            }
+        // The Sobolev part: the same for all three coordinates.
+        let scalar_width = count.next_multiple_of(MAX_LANES);
+        let mut scalar_rows = vec![0.0; MAX_LANES * 9 * scalar_width];
+        let mut scalar = vec![0.0; count * scalar_width];
+        let mut mass = 0.0;
+        for chunk in 0..weights.len() {
+            let place = table.chunk(chunk, S::F64_LANES);
+            let d = table_derivatives(simd, values, place, &points, 3);
             let shape = Shape::new(&d);
             let weight = Lanes(simd, weights[chunk]);
             if self.mixture.sobolev > 0.0 {
@@ -311,45 +331,46 @@ impl WithSimd for ElementMatrix<'_> {
                 simd.partial_store_f64s(&mut area[..S::F64_LANES], shape.area.1);
                 simd.partial_store_f64s(&mut w[..S::F64_LANES], weight.1);
                 for lane in 0..S::F64_LANES {
-                    let sample = S::F64_LANES * chunk + lane;
                     let j = area[lane].max(self.least_area);
-                    self.add_sobolev(sample, w[lane], j, &mut scalar);
+                    mass += w[lane] * j;
+                    let sample = S::F64_LANES * chunk + lane;
+                    let length = 9 * scalar_width;
+                    let from = &self.rule.rows[sample * length..(sample + 1) * length];
+                    let to = &mut scalar_rows[lane * length..(lane + 1) * length];
+                    scale_rows(from, to, scalar_width, &self.sobolev_scales(w[lane], j));
                 }
+                let rows = &scalar_rows[..S::F64_LANES * 9 * scalar_width];
+                add_outer_products(simd, rows, scalar_width, count, &mut scalar);
             }
             if self.mixture.gauss_newton {
-                let rows =
-                    residual_rows(simd, &d, &shape, weight, &self.mixture.density, |row, at| {
-                        for k in 0..count {
-                            let mut sum = [zero; 3];
-                            for (order, adjoint) in row.iter().enumerate() {
-                                let t = Lanes(simd, values[(order * count + k) * chunks + chunk]);
-                                for c in 0..3 {
-                                    sum[c] = t.fma(adjoint[c], sum[c]);
-                                }
-                            }
-                            for c in 0..3 {
-                                let mut lanes = [0.0; MAX_LANES];
-                                simd.partial_store_f64s(&mut lanes[..S::F64_LANES], sum[c].1);
-                                for (lane, &value) in lanes[..S::F64_LANES].iter().enumerate() {
-                                    residuals[(at * S::F64_LANES + lane) * width + 3 * k + c] =
-                                        value;
-                                }
+                let (adjoints, rows) =
+                    residual_adjoints(simd, &shape, weight, &self.mixture.density);
+                for (at, adjoint) in adjoints[..rows].iter().enumerate() {
+                    let row = shape.pull_back(&d, adjoint);
+                    for k in 0..count {
+                        let sum = table_adjoint(simd, values, place, (k, count), &row);
+                        for c in 0..3 {
+                            let mut lanes = [0.0; MAX_LANES];
+                            simd.partial_store_f64s(&mut lanes[..S::F64_LANES], sum[c].1);
+                            for (lane, &value) in lanes[..S::F64_LANES].iter().enumerate() {
+                                residuals[(at * S::F64_LANES + lane) * width + 3 * k + c] = value;
                             }
                         }
-                    });
-                add_outer_products(
-                    simd,
-                    &residuals[..rows * S::F64_LANES * width],
-                    width,
-                    3 * count,
-                    self.matrix,
-                );
+                    }
+                }
+                let rows = &residuals[..rows * S::F64_LANES * width];
+                add_outer_products(simd, rows, width, 3 * count, self.matrix);
             }
         }
         if self.mixture.sobolev > 0.0 {
+            // Order 0, lumped.
+            let lumped = self.mixture.sobolev * self.area * mass
+                / count as f64
+                / (LENGTH_SQUARED * self.area).powi(3);
             for p in 0..count {
+                scalar[p * scalar_width + p] += lumped;
                 for q in p..count {
-                    let value = self.mixture.sobolev * scalar[p * count + q];
+                    let value = scalar[p * scalar_width + q];
                     for c in 0..3 {
                         self.matrix[(3 * p + c) * width + 3 * q + c] += value;
                     }
@@ -360,55 +381,43 @@ impl WithSimd for ElementMatrix<'_> {
 }
 
 impl ElementMatrix<'_> {
-    /// `A Σₖ ℓ^{2(k−3)} |∇ᵏ|²` for k = 1 to 3 with parameter derivatives scaled as if the map were
-    /// conformal: `|∇ᵏ f|² ≈ J^{−k} |∂ᵏ f|²`, times `J` for the area. The order 0 is added with the
-    /// unknowns' own weights to keep translations in.
+    /// Square roots of the factors of the nine squared derivatives in
+    /// `A Σₖ ℓ^{2(k−3)} |∇ᵏ|²`, k = 1 to 3, with parameter derivatives scaled as if the map were
+    /// conformal: `|∇ᵏ f|² ≈ J^{−k} |∂ᵏ f|²`, times `J` for the area. The order 0 is lumped, which
+    /// keeps translations in.
     #[inline(always)]
-    fn add_sobolev(&self, sample: usize, weight: f64, j: f64, scalar: &mut [f64]) {
-        let table = self.table;
-        let count = table.controls;
+    fn sobolev_scales(&self, weight: f64, j: f64) -> [f64; 9] {
         let length = LENGTH_SQUARED * self.area;
-        let orders: [(f64, i32); 9] = [
-            (1.0, 1),
-            (1.0, 1),
-            (1.0, 2),
-            (2.0, 2),
-            (1.0, 2),
-            (1.0, 3),
-            (3.0, 3),
-            (3.0, 3),
-            (1.0, 3),
-        ];
-        for (d, (factor, order)) in orders.into_iter().enumerate() {
-            let scale = self.area * weight * factor * j.powi(1 - order) * length.powi(order - 3);
-            for p in 0..count {
-                let a = scale * table.values[(d * count + p) * table.samples + sample];
-                for q in p..count {
-                    scalar[p * count + q] +=
-                        a * table.values[(d * count + q) * table.samples + sample];
-                }
-            }
-        }
-        // Order 0, lumped.
-        let mass = self.area * weight * j * length.powi(-3) / count as f64;
-        for p in 0..count {
-            scalar[p * count + p] += mass;
+        let first = self.mixture.sobolev * self.area * weight / (length * length);
+        let second = first * length / j;
+        let third = second * length / j;
+        let [first, second, third] = [first.sqrt(), second.sqrt(), third.sqrt()];
+        let (mixed, twice) = (2.0_f64.sqrt() * second, 3.0_f64.sqrt() * third);
+        [first, first, second, mixed, second, third, twice, twice, third]
+    }
+}
+
+#[inline(always)]
+fn scale_rows(from: &[f64], to: &mut [f64], width: usize, factors: &[f64; 9]) {
+    for ((from, to), &factor) in from.chunks(width).zip(to.chunks_mut(width)).zip(factors) {
+        for (x, y) in from.iter().zip(to) {
+            *y = factor * x;
         }
     }
 }
 
-/// Adjoints of the weighted residuals `√(2 w J) f` of one vector of samples, one call of `emit`
-/// for each; returns how many there are.
+/// Adjoints of the weighted residuals `√(2 w J) f` of one vector of samples, and how many of them
+/// are in use.
 #[inline(always)]
-fn residual_rows<S: Simd>(
+fn residual_adjoints<S: Simd>(
     simd: S,
-    d: &Derivatives<S>,
     shape: &Shape<S>,
     weight: Lanes<S>,
     w: &Density,
-    mut emit: impl FnMut(&Derivatives<S>, usize),
-) -> usize {
+) -> ([FrameAdjoint<S>; 7], usize) {
     let zero = Lanes::splat(simd, 0.0);
+    let nothing = FrameAdjoint { harmonics: [zero; 4], second: [zero; 3], area: zero };
+    let mut out = [nothing; 7];
     let root_area = shape.area.sqrt();
     let half = root_area.recip() * 0.5;
     let root_weight = weight.sqrt();
@@ -425,15 +434,12 @@ fn residual_rows<S: Simd>(
     };
     for k in 0..4 {
         let c = if k < 2 { w.f1 } else { w.f3 };
-        if !(c > 0.0 || w.root > 0.0) {
-            continue;
+        if c > 0.0 || w.root > 0.0 {
+            let scale = ((Lanes::splat(simd, c.max(0.0)) + slope) * 2.0).sqrt() * root_weight;
+            out[rows].harmonics[k] = root_area * scale;
+            out[rows].area = f[k] * half * scale;
+            rows += 1;
         }
-        let scale = ((Lanes::splat(simd, c.max(0.0)) + slope) * 2.0).sqrt() * root_weight;
-        let mut harmonics = [zero; 4];
-        harmonics[k] = root_area * scale;
-        let adjoint = FrameAdjoint { harmonics, second: [zero; 3], area: f[k] * half * scale };
-        emit(&shape.pull_back(d, &adjoint), rows);
-        rows += 1;
     }
     // The quadratic form in (l, m, q) along its eigenvectors: (l + q)/√2, (l − q)/√2, m.
     let r = std::f64::consts::FRAC_1_SQRT_2;
@@ -445,13 +451,14 @@ fn residual_rows<S: Simd>(
     for (c, along, value) in forms {
         if c > 0.0 {
             let scale = root_weight * (2.0 * c).sqrt();
-            let second = along.map(|x| root_area * scale * x);
-            let adjoint = FrameAdjoint { harmonics: [zero; 4], second, area: value * half * scale };
-            emit(&shape.pull_back(d, &adjoint), rows);
+            for (second, along) in out[rows].second.iter_mut().zip(along) {
+                *second = root_area * scale * along;
+            }
+            out[rows].area = value * half * scale;
             rows += 1;
         }
     }
-    rows
+    (out, rows)
 }
 
 /// `matrix += RᵀR`, upper triangle up to whole vectors, four rows of `R` at a time.
@@ -465,18 +472,23 @@ fn add_outer_products<S: Simd>(
 ) {
     let mut blocks = rows.chunks_exact(4 * width);
     for block in &mut blocks {
-        let r: [&[S::f64s]; 4] =
-            std::array::from_fn(|i| S::as_simd_f64s(&block[i * width..(i + 1) * width]).0);
+        let (vectors, _) = S::as_simd_f64s(block);
+        let per_row = width / S::F64_LANES;
+        let (r0, rest) = vectors.split_at(per_row);
+        let (r1, rest) = rest.split_at(per_row);
+        let (r2, r3) = rest.split_at(per_row);
         for p in 0..used {
             let from = p / S::F64_LANES;
-            let a: [S::f64s; 4] = std::array::from_fn(|i| simd.splat_f64s(block[i * width + p]));
+            let a0 = simd.splat_f64s(block[p]);
+            let a1 = simd.splat_f64s(block[width + p]);
+            let a2 = simd.splat_f64s(block[2 * width + p]);
+            let a3 = simd.splat_f64s(block[3 * width + p]);
             let (out, _) = S::as_mut_simd_f64s(&mut matrix[p * width..(p + 1) * width]);
-            for q in from..out.len() {
-                let mut sum = out[q];
-                for i in 0..4 {
-                    sum = simd.mul_add_e_f64s(a[i], r[i][q], sum);
-                }
-                out[q] = sum;
+            for q in from..per_row {
+                let mut sum = simd.mul_add_e_f64s(a0, r0[q], out[q]);
+                sum = simd.mul_add_e_f64s(a1, r1[q], sum);
+                sum = simd.mul_add_e_f64s(a2, r2[q], sum);
+                out[q] = simd.mul_add_e_f64s(a3, r3[q], sum);
             }
         }
     }

@@ -101,8 +101,10 @@ pub(crate) struct Table {
     pub(crate) controls: usize,
     /// Number of samples, a multiple of [`MAX_LANES`].
     pub(crate) samples: usize,
-    /// `values[(d · controls + k) · samples + s]`: derivative `d` (the nine after the position) of
-    /// control point `k`'s weight at sample `s`.
+    /// Derivative `d` (the nine after the position) of control point `k`'s weight at all samples, in
+    /// blocks of [`MAX_LANES`] of them: sample `s` stands at
+    /// `((s / MAX_LANES · 9 + d) · controls + k) · MAX_LANES + s % MAX_LANES`. What one vector of
+    /// samples needs lies together, which the caches of a table this size ask for.
     pub(crate) values: Vec<f64>,
     pub(crate) weights: Vec<f64>,
 }
@@ -120,7 +122,8 @@ impl Table {
             let table = surface.weights(basis, u, v);
             for d in 0..9 {
                 for (k, &w) in table.row(d + 1).iter().enumerate() {
-                    values[(d * controls + k) * samples + s] = w;
+                    let block = (s / MAX_LANES * 9 + d) * controls + k;
+                    values[block * MAX_LANES + s % MAX_LANES] = w;
                 }
             }
             if s < nodes * nodes {
@@ -128,6 +131,15 @@ impl Table {
             }
         }
         Self { controls, samples, values, weights }
+    }
+
+    /// Where the vectors of a chunk of `lanes` samples begin among all vectors of that width, and
+    /// the distance from one control point to the next.
+    #[inline(always)]
+    pub(crate) fn chunk(&self, chunk: usize, lanes: usize) -> (usize, usize) {
+        let per_block = MAX_LANES / lanes;
+        let block = chunk / per_block * 9 * self.controls;
+        (block * per_block + chunk % per_block, per_block)
     }
 }
 

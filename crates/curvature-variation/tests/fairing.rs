@@ -165,7 +165,7 @@ fn weights_pull_limit_points_to_their_places() {
     };
     let distances = [1.0, 100.0, 1e4].map(distance);
     assert!(
-        distances[0] > 3.0 * distances[1] && distances[1] > 30.0 * distances[2],
+        distances[0] > 3.0 * distances[1] && distances[1] > 10.0 * distances[2],
         "{distances:?}"
     );
     let constraints = Constraints { weights: vec![(0, -1.0)], ..Constraints::default() };

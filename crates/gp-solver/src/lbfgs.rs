@@ -23,12 +23,9 @@ impl<F: FnMut(&[f64], &mut [f64]) -> f64> Objective for F {
 }
 
 /// A symmetric positive definite metric `M` that stands in for the Hessian where the memory says
-/// nothing: the search direction begins as `−M⁻¹ g`.
+/// nothing: the search direction begins as `−M⁻¹ g`. It stays the same during a minimisation, which
+/// makes one application per step enough; a new metric begins a new minimisation.
 pub trait Metric {
-    /// Called at the start and after every step; the place to assemble and factor anew when the
-    /// iterate has moved far enough.
-    fn refresh(&mut self, _x: &[f64], _iteration: usize) {}
-
     /// Replaces `gradient` by `M⁻¹ gradient`.
     fn apply_inverse(&mut self, gradient: &mut [f64]);
 }
@@ -120,6 +117,8 @@ pub struct LbfgsReport {
 struct Pair {
     s: Vec<f64>,
     y: Vec<f64>,
+    /// `M⁻¹ y`, the difference of two gradients' images.
+    image: Vec<f64>,
     /// `1 / (s·y)`.
     rho: f64,
 }
@@ -144,14 +143,17 @@ pub fn lbfgs(
     let mut evaluations = 1;
     let mut history = vec![energy];
     let mut memory: VecDeque<Pair> = VecDeque::with_capacity(options.memory + 1);
-    metric.refresh(x, 0);
-    let mut direction = gradient.clone();
-    metric.apply_inverse(&mut direction);
-    let mut gradient_norm = dot(&gradient, &direction).max(0.0).sqrt();
+    // M⁻¹ g at the iterate.
+    let mut natural = gradient.clone();
+    metric.apply_inverse(&mut natural);
+    let mut direction = vec![0.0; n];
+    let mut rest = vec![0.0; n];
+    let mut gradient_norm = dot(&gradient, &natural).max(0.0).sqrt();
     let first_norm = gradient_norm;
     let mut step = 0.0;
     let mut trial = x.to_vec();
     let mut trial_gradient = vec![0.0; n];
+    let mut trial_natural = vec![0.0; n];
     let status = loop {
         let iteration = history.len() - 1;
         let seen = LbfgsIteration { iteration, x, energy, gradient_norm, step, evaluations };
@@ -166,12 +168,12 @@ pub fn lbfgs(
         if iteration >= options.max_iterations {
             break Status::IterationLimit;
         }
-        two_loop(&memory, metric, &gradient, &mut direction);
+        two_loop(&memory, &gradient, &natural, &mut rest, &mut direction);
         let mut slope = dot(&gradient, &direction);
         if !(slope < 0.0) {
-            // Rounding or a refreshed metric can spoil the direction; the metric's own never is.
+            // Rounding can spoil the direction; the metric's own never is.
             memory.clear();
-            two_loop(&memory, metric, &gradient, &mut direction);
+            two_loop(&memory, &gradient, &natural, &mut rest, &mut direction);
             slope = dot(&gradient, &direction);
             if !(slope < 0.0) {
                 break Status::Stalled;
@@ -193,19 +195,22 @@ pub fn lbfgs(
                 break;
             }
             memory.clear();
-            two_loop(&memory, metric, &gradient, &mut direction);
+            two_loop(&memory, &gradient, &natural, &mut rest, &mut direction);
             slope = dot(&gradient, &direction);
         }
         let Outcome::Step { length, value } = outcome else { break Status::Stalled };
         let s: Vec<f64> = trial.iter().zip(x.iter()).map(|(a, b)| a - b).collect();
         let y: Vec<f64> = trial_gradient.iter().zip(&gradient).map(|(a, b)| a - b).collect();
+        trial_natural.copy_from_slice(&trial_gradient);
+        metric.apply_inverse(&mut trial_natural);
         let curvature = dot(&s, &y);
         if curvature > f64::EPSILON * dot(&y, &y).sqrt() * dot(&s, &s).sqrt() {
             if memory.len() == options.memory {
                 memory.pop_front();
             }
             if options.memory > 0 {
-                memory.push_back(Pair { s, y, rho: 1.0 / curvature });
+                let image = trial_natural.iter().zip(&natural).map(|(a, b)| a - b).collect();
+                memory.push_back(Pair { s, y, image, rho: 1.0 / curvature });
             }
         }
         x.copy_from_slice(&trial);
@@ -213,10 +218,8 @@ pub fn lbfgs(
         energy = value;
         step = length;
         history.push(energy);
-        metric.refresh(x, history.len() - 1);
-        trial_gradient.copy_from_slice(&gradient);
-        metric.apply_inverse(&mut trial_gradient);
-        gradient_norm = dot(&gradient, &trial_gradient).max(0.0).sqrt();
+        std::mem::swap(&mut natural, &mut trial_natural);
+        gradient_norm = dot(&gradient, &natural).max(0.0).sqrt();
         tracing::debug!(iteration = history.len() - 1, energy, step, gradient = gradient_norm);
     };
     Ok(LbfgsReport {
@@ -237,24 +240,24 @@ fn first_step(energy: f64, slope: f64) -> f64 {
     if energy == 0.0 { 1.0 } else { (0.2 * energy.abs() / -slope).min(1.0) }
 }
 
-/// `direction = −H g`.
+/// `direction = −H g`, from `natural = M⁻¹ g`; `rest` is scratch space.
 fn two_loop(
     memory: &VecDeque<Pair>,
-    metric: &mut (impl Metric + ?Sized),
     gradient: &[f64],
+    natural: &[f64],
+    rest: &mut [f64],
     direction: &mut [f64],
 ) {
-    direction.copy_from_slice(gradient);
+    rest.copy_from_slice(gradient);
+    direction.copy_from_slice(natural);
     let mut alpha = vec![0.0; memory.len()];
     for (pair, a) in memory.iter().zip(&mut alpha).rev() {
-        *a = pair.rho * dot(&pair.s, direction);
-        add_scaled(direction, -*a, &pair.y);
+        *a = pair.rho * dot(&pair.s, rest);
+        add_scaled(rest, -*a, &pair.y);
+        add_scaled(direction, -*a, &pair.image);
     }
-    metric.apply_inverse(direction);
     if let Some(last) = memory.back() {
-        let mut image = last.y.clone();
-        metric.apply_inverse(&mut image);
-        let gamma = 1.0 / (last.rho * dot(&last.y, &image));
+        let gamma = 1.0 / (last.rho * dot(&last.y, &last.image));
         if gamma.is_finite() && gamma > 0.0 {
             direction.iter_mut().for_each(|d| *d *= gamma);
         }
