@@ -41,6 +41,25 @@ pub(crate) enum Targets<'a> {
     Columns(&'a [u32]),
 }
 
+impl Targets<'_> {
+    /// Where the entry of the first row of run `other` and column `c` of run `own` stands; `before` is
+    /// the number of table entries of the columns of earlier runs.
+    #[inline(always)]
+    fn of(self, runs: &[Run], before: usize, own: usize, c: usize, other: usize) -> usize {
+        match self {
+            Targets::Band { stride, positions } => {
+                let column = positions[runs[own].begin as usize + c] as usize;
+                column * stride + positions[runs[other].begin as usize] as usize
+            }
+            Targets::Columns(table) => {
+                let entry = table[before + c * (runs.len() - own) + other - own] as usize;
+                // In its own run a column's entry is the diagonal one.
+                if other == own { entry - c } else { entry }
+            }
+        }
+    }
+}
+
 /// Adds the lower triangle of `XᵀX` to the matrix and puts `Xᵀr` into `products`, by packed column;
 /// `x` holds packed rows of length `stride`.
 pub(crate) struct AddGram<'a> {
@@ -68,6 +87,9 @@ impl WithSimd for AddGram<'_> {
                 *sum = simd.mul_add_f64s(value, r, *sum);
             }
         }
+        if residuals.len() <= FEW_ROWS {
+            return add_few_rows(x, stride, runs, targets, values);
+        }
         let lanes = S::F64_LANES;
         // Number of targets of the columns of earlier runs.
         let mut before = 0;
@@ -76,29 +98,44 @@ impl WithSimd for AddGram<'_> {
             for c in (0..run.len()).step_by(2) {
                 let columns = (run.len() - c).min(2);
                 for (other, rows) in runs.iter().enumerate().skip(own) {
-                    let is_own = other == own;
                     let mut to = [0; 2];
                     for (q, to) in to[..columns].iter_mut().enumerate() {
-                        *to = match targets {
-                            Targets::Band { stride, positions } => {
-                                let column = positions[run.begin as usize + c + q] as usize;
-                                column * stride + positions[rows.begin as usize] as usize
-                            }
-                            Targets::Columns(table) => {
-                                let entry = table[before + (c + q) * from_here + other - own];
-                                // In its own run a column's entry is the diagonal one.
-                                entry as usize - if is_own { c + q } else { 0 }
-                            }
-                        };
+                        *to = targets.of(runs, before, own, c + q, other);
                     }
                     let pair = Pair { at: run.at as usize + c, targets: &to[..columns] };
                     let (first, diagonal) =
-                        if is_own { (c / lanes * lanes, Some(c)) } else { (0, None) };
+                        if other == own { (c / lanes * lanes, Some(c)) } else { (0, None) };
                     add_products(simd, (x, stride), *rows, first, diagonal, pair, values);
                 }
             }
             before += run.len() * from_here;
         }
+    }
+}
+
+/// Tiles do not pay for elements of up to this many rows.
+const FEW_ROWS: usize = 2;
+
+/// Adds the products of a row or two entry by entry.
+#[inline(always)]
+fn add_few_rows(x: &[f64], stride: usize, runs: &[Run], targets: Targets<'_>, values: &mut [f64]) {
+    let mut before = 0;
+    for (own, run) in runs.iter().enumerate() {
+        for c in 0..run.len() {
+            for (other, rows) in runs.iter().enumerate().skip(own) {
+                let first = if other == own { c } else { 0 };
+                let begin = targets.of(runs, before, own, c, other) + first;
+                let to = &mut values[begin..begin + rows.len() - first];
+                for row in x.chunks_exact(stride) {
+                    let factor = row[run.at as usize + c];
+                    let from = &row[rows.at as usize + first..];
+                    for (to, &value) in to.iter_mut().zip(from) {
+                        *to += factor * value;
+                    }
+                }
+            }
+        }
+        before += run.len() * (runs.len() - own);
     }
 }
 
@@ -247,7 +284,7 @@ mod tests {
                 .flat_map(|(r, run)| (run.begin..run.end).map(move |c| c + 2 * r as u32))
                 .collect();
             let size = positions[k - 1] as usize + 1;
-            for rows in [1, 5, 9] {
+            for rows in [1, 2, 5, 9] {
                 let mut x = vec![0.0; rows * stride];
                 for r in 0..rows {
                     for run in &runs {
