@@ -3,7 +3,8 @@
 usage: spline_library.py FILE [SAMPLES]
 
 Prints [{"samples": [[u, v, S, S_u, S_v, S_uu, S_uv, S_vv], ..]}, ..] with three coordinates each
-in one flat list; the grid includes both ends of both parameters.
+in one flat list; the grid includes both ends of both parameters. geomdl rescales knots to [0, 1],
+so parameters and derivatives are those of a domain scaled to the unit square.
 """
 
 import json
@@ -19,10 +20,11 @@ def samples_of(surface, count):
     found = []
     for i in range(count):
         for j in range(count):
-            u = u0 + (u1 - u0) * i / (count - 1)
-            v = v0 + (v1 - v0) * j / (count - 1)
-            jet = surface.derivatives(u, v, 2)
-            found.append([u, v] + [x for a, b in ORDERS for x in jet[a][b]])
+            u, v = i / (count - 1), j / (count - 1)
+            jet = surface.derivatives(u0 + (u1 - u0) * u, v0 + (v1 - v0) * v, 2)
+            scales = [(u1 - u0) ** a * (v1 - v0) ** b for a, b in ORDERS]
+            vectors = [jet[a][b] for a, b in ORDERS]
+            found.append([u, v] + [s * x for s, vector in zip(scales, vectors) for x in vector])
     return found
 
 

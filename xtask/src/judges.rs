@@ -35,7 +35,7 @@ struct Face {
 /// What the judge of geomdl prints of one surface.
 #[derive(Deserialize)]
 struct Derivatives {
-    /// u, v, S, S_u, S_v, S_uu, S_uv, S_vv.
+    /// u, v, S, S_u, S_v, S_uu, S_uv, S_vv, on the domain scaled to the unit square.
     samples: Vec<Vec<f64>>,
 }
 
@@ -212,6 +212,8 @@ fn judge_json(python: &Path, file: &Path) -> Outcome<String> {
     }
     let mut worst = [0.0_f64; ORDERS.len()];
     for (theirs, ours) in theirs.iter().zip(&model.surfaces) {
+        let surface = &ours.surface;
+        let [(u0, u1), (v0, v1)] = [surface.knots_u().domain(), surface.knots_v().domain()];
         for (k, &(a, b)) in ORDERS.iter().enumerate() {
             let (mut size, mut difference) = (0.0_f64, 0.0_f64);
             for sample in &theirs.samples {
@@ -223,7 +225,9 @@ fn judge_json(python: &Path, file: &Path) -> Outcome<String> {
                 };
                 let got = geom_core::DVec3::new(x, y, z);
                 size = size.max(got.length());
-                difference = difference.max(ours.surface.jet(*u, *v, 2).d(a, b).distance(got));
+                let jet = surface.jet(u0 + (u1 - u0) * u, v0 + (v1 - v0) * v, 2);
+                let scale = (u1 - u0).powi(a as i32) * (v1 - v0).powi(b as i32);
+                difference = difference.max((scale * jet.d(a, b)).distance(got));
             }
             // Written so that NaN is a disagreement.
             worst[k] = worst[k].max(if difference > 0.0 { difference / size } else { difference });

@@ -117,6 +117,8 @@ pub(crate) fn problem(
         problem.add(Shape::new(net, &reference, w.shape));
     }
     add_border(&mut problem, options.border, &level.reference, &reference)?;
+    // Control points and the auxiliary variables of a sample both come in threes.
+    problem.set_runs(3);
     Ok(problem)
 }
 
