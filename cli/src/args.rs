@@ -1,6 +1,5 @@
 //! Flags that several commands share. A command flattens those it honours, and no others: a flag
 //! whose feature is not there is an unknown flag.
-#![allow(dead_code, reason = "each group is used by the commands that honour it")]
 
 use crate::failure::Failure;
 use serde::{Deserialize, Deserializer};

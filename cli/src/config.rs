@@ -1,5 +1,4 @@
 //! Options from a RON file below those from flags.
-#![allow(dead_code, reason = "used by the commands with method options")]
 
 use crate::args::ConfigArgs;
 use crate::failure::Failure;

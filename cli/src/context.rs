@@ -44,7 +44,6 @@ impl Context {
     }
 
     /// Whether the user pressed Ctrl-C: the callback of every solver asks.
-    #[allow(dead_code, reason = "used by the solving commands")]
     pub(crate) fn interrupted(&self) -> bool {
         self.heeded.store(true, Ordering::SeqCst);
         self.interrupt.load(Ordering::SeqCst)
@@ -57,7 +56,6 @@ impl Context {
     }
 
     /// A progress bar of `steps` steps on stderr; invisible unless stderr is a terminal.
-    #[allow(dead_code, reason = "used by the solving commands")]
     pub(crate) fn progress(&self, label: &'static str, steps: usize) -> Progress {
         let visible = !self.quiet && std::io::stderr().is_terminal();
         let target =
@@ -74,7 +72,6 @@ impl Context {
 #[derive(Debug)]
 pub(crate) struct Progress(ProgressBar);
 
-#[allow(dead_code, reason = "used by the solving commands")]
 impl Progress {
     /// `done` steps are done; `message` tells the current energies.
     pub(crate) fn at(&self, done: usize, message: impl Into<String>) {

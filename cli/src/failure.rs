@@ -33,7 +33,6 @@ impl Failure {
     }
 
     /// Everything else: not the user's fault.
-    #[allow(dead_code, reason = "used by the solving commands")]
     pub(crate) fn other(message: impl fmt::Display) -> Self {
         Self { code: DEFECT, message: message.to_string() }
     }

@@ -7,7 +7,6 @@ use std::path::{Path, PathBuf};
 /// How a command ended. Commands that do not iterate always converge.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
-#[allow(dead_code, reason = "used by the solving commands")]
 pub(crate) enum Status {
     Converged,
     Stalled,

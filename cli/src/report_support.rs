@@ -11,7 +11,6 @@
 //!     report_support::add_files(&mut outcome, &self.report, context, report)?;
 //! }
 //! ```
-#![allow(dead_code, reason = "each helper is used by the commands that make such a view")]
 
 pub(crate) mod energies;
 pub(crate) mod jets;

@@ -22,24 +22,6 @@ pub(crate) struct JetGrid {
 }
 
 impl JetGrid {
-    /// Evaluates `jet(u, v)` over the unit square at `rows` x `columns` points.
-    pub(crate) fn sampled(
-        rows: usize,
-        columns: usize,
-        jet: impl Fn(f64, f64) -> SurfaceJet,
-    ) -> Self {
-        let at = |i: usize, n: usize| {
-            let t = i as f64 / (n.max(2) - 1) as f64;
-            t.clamp(0.0, 1.0)
-        };
-        let jets = (0..rows * columns).map(|k| {
-            let (u, v) = (at(k / columns, rows), at(k % columns, columns));
-            let middle = |t: f64| t + INSIDE * (0.5 - t);
-            regular(jet(u, v), || jet(middle(u), middle(v)))
-        });
-        Self { jets: jets.collect(), rows, columns }
-    }
-
     /// Points per side of each of `count` pieces so that the whole is neither coarse nor heavy.
     pub(crate) fn side_for(count: usize) -> usize {
         (VERTICES / count.max(1) as f64).sqrt().clamp(4.0, 110.0) as usize
@@ -261,7 +243,12 @@ mod tests {
             jet.derivatives[2] = DVec3::new(-u * sin, u * cos, 0.0);
             jet
         };
-        let grid = JetGrid::sampled(4, 5, cone);
+        let jets = (0..20).map(|k| {
+            let (u, v) = (f64::from(k / 5) / 3.0, f64::from(k % 5) / 4.0);
+            regular(cone(u, v), || cone(u + INSIDE, v))
+        });
+        let grid = JetGrid { jets: jets.collect(), rows: 4, columns: 5 };
+        assert!(grid.jets.iter().all(|jet| jet.normal().is_ok()));
         let view = jets_view("cone", &[grid], "").unwrap();
         assert_eq!(view.triangles().len(), 24);
         assert_eq!(view.positions()[0], DVec3::ZERO);
