@@ -1,36 +1,7 @@
 //! `umbilic hnet` and `umbilic darboux` from the outside: files, exit codes, messages.
 
+use crate::common::{refused, umbilic};
 use std::fs;
-use std::path::{Path, PathBuf};
-use std::process::{Command, Output};
-
-fn root() -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join("..")
-}
-
-fn umbilic(args: &[&str]) -> Output {
-    Command::new(env!("CARGO_BIN_EXE_umbilic"))
-        .current_dir(root())
-        .args(args)
-        .output()
-        .expect("the program starts")
-}
-
-/// A refusal: exit code 2, one sentence with these words, nothing written.
-fn refused(args: &[&str], out: &str, words: &[&str]) {
-    let folder = tempfile::tempdir().expect("a folder");
-    let out = folder.path().join(out).display().to_string();
-    let mut all = args.to_vec();
-    all.extend(["-o", &out]);
-    let result = umbilic(&all);
-    let message = String::from_utf8_lossy(&result.stderr).into_owned();
-    assert_eq!(result.status.code(), Some(2), "{args:?}: {message}");
-    for word in words {
-        assert!(message.contains(word), "{args:?}: {message} lacks {word}");
-    }
-    assert!(!message.contains("panicked"), "{message}");
-    assert_eq!(fs::read_dir(folder.path()).expect("a folder").count(), 0, "{args:?}");
-}
 
 /// `n` × `n` quads over the saddle `z = x y`, whose asymptotic lines are the grid.
 fn saddle(n: usize) -> String {

@@ -2,25 +2,13 @@
 
 #![allow(clippy::unwrap_used, reason = "a test may stop at the first surprise")]
 
+use crate::common::{message, root, umbilic};
 use std::fs;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::process::{Command, Output};
-
-fn root() -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).parent().unwrap().to_path_buf()
-}
-
-/// Runs `umbilic` in the root of the repository.
-fn run(args: &[&str]) -> Output {
-    Command::new(env!("CARGO_BIN_EXE_umbilic")).args(args).current_dir(root()).output().unwrap()
-}
 
 fn code(output: &Output) -> i32 {
     output.status.code().unwrap()
-}
-
-fn errors(output: &Output) -> String {
-    String::from_utf8(output.stderr.clone()).unwrap()
 }
 
 /// Runs a command that must fail as bad input with one line that begins so, and write nothing.
@@ -31,8 +19,8 @@ fn refused(args: &[&str], want: &str) {
     let (out, metrics) = (out.to_str().unwrap(), metrics.to_str().unwrap());
     let mut all: Vec<&str> = args.iter().map(|a| if *a == "OUT" { out } else { a }).collect();
     all.extend(["--metrics", metrics]);
-    let output = run(&all);
-    let message = errors(&output);
+    let output = umbilic(&all);
+    let message = message(&output);
     assert_eq!(code(&output), 2, "{args:?}: {message}");
     assert!(message.starts_with(want), "{message}, not {want}");
     assert_eq!(message.lines().count(), 1, "{message}");
@@ -43,7 +31,7 @@ fn refused(args: &[&str], want: &str) {
 fn analyze_measures_a_sphere() {
     let folder = tempfile::tempdir().unwrap();
     let file = folder.path().join("m.json");
-    let output = run(&[
+    let output = umbilic(&[
         "analyze",
         "fixtures/sphere-cap.ron",
         "--metrics",
@@ -51,7 +39,7 @@ fn analyze_measures_a_sphere() {
         "--threads",
         "1",
     ]);
-    assert_eq!(code(&output), 0, "{}", errors(&output));
+    assert_eq!(code(&output), 0, "{}", message(&output));
     let text = String::from_utf8(output.stdout).unwrap();
     assert!(text.contains("mean curvature      from -1.000000 to -1.000000"), "{text}");
     let json: serde_json::Value = serde_json::from_slice(&fs::read(file).unwrap()).unwrap();
@@ -100,7 +88,7 @@ fn every_help_has_an_example_that_works_as_printed() {
     let path = format!("{}:{}", programs.display(), std::env::var("PATH").unwrap());
     for command in cli::command().get_subcommands() {
         let name = command.get_name();
-        let help = String::from_utf8(run(&[name, "--help"]).stdout).unwrap();
+        let help = String::from_utf8(umbilic(&[name, "--help"]).stdout).unwrap();
         let lines = examples(&help);
         assert!(!lines.is_empty(), "{name} has no example: {help}");
         // The demo has a test of its own.
@@ -108,8 +96,8 @@ fn every_help_has_an_example_that_works_as_printed() {
             let mut shell = Command::new("sh");
             shell.args(["-c", line]).current_dir(folder.path()).env("PATH", &path);
             let output = shell.output().unwrap();
-            assert_eq!(code(&output), 0, "{line}: {}", errors(&output));
-            assert_eq!(errors(&output), "", "{line}");
+            assert_eq!(code(&output), 0, "{line}: {}", message(&output));
+            assert_eq!(message(&output), "", "{line}");
         }
     }
 }
@@ -125,12 +113,12 @@ fn usage_errors_exit_with_2() {
         &["fit", "fixtures/grid.obj", "-o", "a.step", "--ctrl", "5"],
         &[],
     ] {
-        let output = run(args);
+        let output = umbilic(args);
         assert_eq!(code(&output), 2, "{args:?}");
-        assert!(!errors(&output).is_empty());
+        assert!(!message(&output).is_empty());
     }
     for args in [&["--help"][..], &["--version"], &["help", "fit"]] {
-        assert_eq!(code(&run(args)), 0, "{args:?}");
+        assert_eq!(code(&umbilic(args)), 0, "{args:?}");
     }
 }
 
@@ -198,13 +186,13 @@ fn an_existing_file_survives_a_failure_and_flags_override_the_config() {
     fs::write(&out, "before").unwrap();
     let fit = ["fit", "fixtures/grid.obj", "-o", &out];
     let failing = [&fit[..], &["-o", "no/such/b.step"]].concat();
-    assert_eq!(code(&run(&failing)), 2);
+    assert_eq!(code(&umbilic(&failing)), 2);
     assert_eq!(fs::read_to_string(&out).unwrap(), "before");
     fs::write(&config, "(ctrl: \"9x8\", degree: 3)").unwrap();
     let all =
         [&fit[..], &["--config", &config, "--ctrl", "10x9", "--metrics", &metrics, "-q"]].concat();
-    let output = run(&all);
-    assert_eq!(code(&output), 0, "{}", errors(&output));
+    let output = umbilic(&all);
+    assert_eq!(code(&output), 0, "{}", message(&output));
     assert!(output.stdout.is_empty(), "-q prints nothing");
     let json: serde_json::Value = serde_json::from_slice(&fs::read(&metrics).unwrap()).unwrap();
     let metrics = &json["metrics"];
@@ -226,8 +214,8 @@ fn conversions_chain_without_loss() {
         &path("d.ron"),
     ];
     for pair in steps.windows(2) {
-        let output = run(&["convert", pair[0], pair[1]]);
-        assert_eq!((code(&output), errors(&output)), (0, String::new()), "{pair:?}");
+        let output = umbilic(&["convert", pair[0], pair[1]]);
+        assert_eq!((code(&output), message(&output)), (0, String::new()), "{pair:?}");
     }
     let surfaces = |file: &str| {
         let text = fs::read_to_string(root().join(file)).unwrap();

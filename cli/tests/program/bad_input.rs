@@ -1,21 +1,8 @@
 //! Bad input of the main job, kind by kind: one sentence with file, place and mend, exit code 2,
 //! and no output file touched.
 
+use crate::common::{root, umbilic};
 use std::fs;
-use std::path::{Path, PathBuf};
-use std::process::{Command, Output};
-
-fn root() -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join("..")
-}
-
-fn umbilic(args: &[&str]) -> Output {
-    Command::new(env!("CARGO_BIN_EXE_umbilic"))
-        .current_dir(root())
-        .args(args)
-        .output()
-        .expect("the program starts")
-}
 
 /// Runs the main job with these arguments; `want` is the sentence without the program's name.
 fn refused(args: &[&str], want: &str) {

@@ -1,29 +1,15 @@
 //! What is on the disk after an interruption, a kill and a full disk: never half a file.
-#![cfg(unix)]
 
+use crate::common::{UMBILIC, message, root, umbilic};
 use std::fs;
 use std::io::{BufRead, BufReader, Read};
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::process::{Command, Output, Stdio};
 use std::time::{Duration, Instant};
-
-const UMBILIC: &str = env!("CARGO_BIN_EXE_umbilic");
-
-fn root() -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join("..")
-}
-
-fn umbilic(args: &[&str]) -> Output {
-    Command::new(UMBILIC).current_dir(root()).args(args).output().expect("the program starts")
-}
 
 /// Runs a line of `sh` in the root of the repository.
 fn shell(line: &str) -> Output {
     Command::new("sh").arg("-c").arg(line).current_dir(root()).output().expect("sh starts")
-}
-
-fn message(output: &Output) -> String {
-    String::from_utf8_lossy(&output.stderr).into_owned()
 }
 
 fn names(folder: &Path) -> Vec<String> {

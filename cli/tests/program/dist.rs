@@ -1,16 +1,12 @@
 //! Man pages and shell completions, and what every help text has.
 
-#[path = "../examples/dist.rs"]
-#[allow(dead_code, reason = "its main is not called")]
-mod dist;
-
 use std::fs;
 use std::process::Command;
 
 #[test]
 fn every_command_has_a_man_page_with_its_flags() {
     let folder = tempfile::tempdir().expect("a folder");
-    dist::write(folder.path()).expect("written");
+    crate::dist_example::write(folder.path()).expect("written");
     let page = |name: &str| {
         let path = folder.path().join("man").join(name);
         fs::read_to_string(&path).unwrap_or_else(|e| panic!("{}: {e}", path.display()))
@@ -30,7 +26,7 @@ fn every_command_has_a_man_page_with_its_flags() {
 #[test]
 fn completions_know_commands_and_flags() {
     let folder = tempfile::tempdir().expect("a folder");
-    dist::write(folder.path()).expect("written");
+    crate::dist_example::write(folder.path()).expect("written");
     let files = ["umbilic.bash", "_umbilic", "umbilic.fish", "_umbilic.ps1", "umbilic.elv"];
     for file in files {
         let path = folder.path().join("completions").join(file);

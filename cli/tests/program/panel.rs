@@ -2,17 +2,12 @@
 
 #![allow(clippy::unwrap_used, reason = "a test may stop at the first surprise")]
 
+use crate::common::umbilic;
 use std::fs;
-use std::path::{Path, PathBuf};
-use std::process::{Command, Output};
-
-fn root() -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join("..")
-}
+use std::process::Output;
 
 fn panel(surface: &str, args: &[&str]) -> Output {
-    let mut command = Command::new(env!("CARGO_BIN_EXE_umbilic"));
-    command.current_dir(root()).args(["panel", surface]).args(args).output().unwrap()
+    umbilic(&[&["panel", surface], args].concat())
 }
 
 /// Runs the command, which must refuse its input with one sentence and write nothing.

@@ -1,34 +1,15 @@
 //! `umbilic fair` from the outside: files, metrics, exit codes, messages.
 
+use crate::common;
+use crate::common::umbilic;
 use std::fs;
 use std::path::{Path, PathBuf};
-use std::process::{Command, Output};
 
 const THETA: &str = "fixtures/quads/theta.obj";
 
-fn umbilic(args: &[&str]) -> Output {
-    Command::new(env!("CARGO_BIN_EXE_umbilic"))
-        .current_dir(Path::new(env!("CARGO_MANIFEST_DIR")).join(".."))
-        .args(args)
-        .output()
-        .expect("the program starts")
-}
-
 /// A refusal: exit code 2, a message with these words, nothing written.
 fn refused(args: &[&str], words: &[&str]) {
-    let folder = tempfile::tempdir().expect("a folder");
-    let out = folder.path().join("out.obj").display().to_string();
-    let mut all = vec!["fair"];
-    all.extend(args);
-    all.extend(["-o", &out]);
-    let result = umbilic(&all);
-    let message = String::from_utf8_lossy(&result.stderr).into_owned();
-    assert_eq!(result.status.code(), Some(2), "{args:?}: {message}");
-    for word in words {
-        assert!(message.contains(word), "{args:?}: {message} lacks {word}");
-    }
-    assert!(!message.contains("panicked"), "{message}");
-    assert_eq!(fs::read_dir(folder.path()).expect("a folder").count(), 0, "{args:?}");
+    common::refused(&[&["fair"], args].concat(), "out.obj", words);
 }
 
 fn written(folder: &Path, name: &str, content: &str) -> String {

@@ -3,16 +3,16 @@
 
 #![allow(clippy::unwrap_used, reason = "a test may stop at the first surprise")]
 
+use crate::common::{message, umbilic};
 use std::collections::BTreeMap;
 use std::fs;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::process::Command;
 
-fn umbilic(args: &[&str]) {
-    let root: PathBuf = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
-    let mut command = Command::new(env!("CARGO_BIN_EXE_umbilic"));
-    let output = command.current_dir(root).args(args).output().unwrap();
-    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+/// Runs the program, which must succeed.
+fn succeed(args: &[&str]) {
+    let output = umbilic(args);
+    assert!(output.status.success(), "{}", message(&output));
 }
 
 /// The page without the one block that may change from run to run.
@@ -37,7 +37,7 @@ fn pages_and_figures_repeat_for_any_number_of_threads() {
         let page = folder.path().join("page.html");
         let figures = folder.path().join("figures");
         fs::create_dir(&figures).unwrap();
-        umbilic(&[
+        succeed(&[
             "analyze",
             "fixtures/torus-patch.ron",
             "--report",
@@ -68,7 +68,7 @@ fn pages_and_figures_repeat_for_any_number_of_threads() {
 fn the_page_of_the_demo_is_small_and_repeats() {
     let pages = ["1", "2"].map(|threads| {
         let folder = tempfile::tempdir().unwrap();
-        umbilic(&["demo", folder.path().to_str().unwrap(), "--threads", threads]);
+        succeed(&["demo", folder.path().to_str().unwrap(), "--threads", threads]);
         let page = folder.path().join("report.html");
         assert!(fs::metadata(&page).unwrap().len() <= 3_000_000);
         lasting(&page)
@@ -91,7 +91,7 @@ fn the_page_of_the_demo_is_small_and_repeats() {
 fn the_page_of_panels_shows_molds_kinks_and_seams() {
     let folder = tempfile::tempdir().unwrap();
     let [table, page] = ["panels.csv", "page.html"].map(|name| folder.path().join(name));
-    umbilic(&[
+    succeed(&[
         "panel",
         "fixtures/saddle.ron",
         "--panels",

@@ -1,0 +1,17 @@
+//! The program from the outside: files, metrics, exit codes, messages. One test program, so that
+//! what the tests share stands once and is linked once.
+
+mod bad_input;
+mod common;
+mod dist;
+#[path = "../../examples/dist.rs"]
+#[allow(dead_code, reason = "its main is not called")]
+mod dist_example;
+mod every_command;
+mod fair;
+mod hyperbolic;
+#[cfg(unix)]
+mod interruptions;
+mod panel;
+mod report;
+mod weingarten;
