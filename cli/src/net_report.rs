@@ -2,7 +2,7 @@
 
 use crate::failure::Failure;
 use crate::net_files::PICTURE_CELLS;
-use crate::outcome::Outcome;
+use crate::report_support;
 use exchange::LengthUnit;
 use geom_core::DVec3;
 use hyperbolic_nets::{HyperbolicNet, NetReport, PatchJet, SampledPatches};
@@ -12,20 +12,11 @@ use report::{
 };
 use std::path::Path;
 
-/// A page with status, metrics and warnings of an outcome.
-pub(crate) fn page(title: &str, input: &Path, unit: &LengthUnit, outcome: &Outcome) -> Report {
-    let command = std::env::args().skip(1).collect::<Vec<_>>().join(" ");
-    let mut page = Report::new(title, format!("umbilic {command}"));
-    page.status = serde_json::to_value(outcome.status)
-        .ok()
-        .and_then(|v| v.as_str().map(str::to_owned))
-        .unwrap_or_default();
+/// A page about this input; status, metrics and warnings come with the files.
+pub(crate) fn page(title: &str, input: &Path, unit: &LengthUnit) -> Report {
+    let mut page = report_support::new(title);
     page.length_unit = unit.to_string();
-    page.warnings.clone_from(&outcome.warnings);
     page.option("input", input.display());
-    if let serde_json::Value::Object(map) = &outcome.metrics {
-        page.metrics.clone_from(map);
-    }
     page
 }
 

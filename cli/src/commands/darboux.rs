@@ -1,11 +1,12 @@
 //! `umbilic darboux NET -o OUT`.
 
-use crate::args::{ConvergedArgs, OutputArgs};
+use crate::args::{ConvergedArgs, OutputArgs, ReportArgs};
 use crate::context::Context;
 use crate::failure::Failure;
 use crate::net_files::{self, NetInput};
 use crate::net_report;
 use crate::outcome::{Outcome, Status};
+use crate::report_support;
 use exchange::Model;
 use geom_core::{BoundingBox, DVec3, TriMesh};
 use hyperbolic_nets::{
@@ -40,9 +41,8 @@ pub(crate) struct Darboux {
     /// Which of the two images
     #[arg(long, value_enum, default_value = "regular")]
     branch: BranchChoice,
-    /// Write a report with both images and their cages
-    #[arg(long, value_name = "FILE.html")]
-    report: Option<PathBuf>,
+    #[command(flatten)]
+    report: ReportArgs,
     #[command(flatten)]
     converged: ConvergedArgs,
 }
@@ -119,9 +119,7 @@ const CAGE_MARGIN: f64 = 0.05;
 
 impl Darboux {
     pub(crate) fn run(self, context: &Context) -> Result<Outcome, Failure> {
-        if let Some(path) = &self.report {
-            crate::args::check_output_path(path)?;
-        }
+        self.report.check()?;
         net_files::check_outputs(&self.output.output, &["glb", "obj", "ply", "stl"])?;
         let (input, unit, mut warnings) = net_files::read(&self.input)?;
         let (surface, status, steps) = match input {
@@ -173,8 +171,8 @@ impl Darboux {
         }
         outcome.summary = summary(&metrics, &unit.to_string());
         outcome.warnings = warnings;
-        if let Some(path) = self.report {
-            let mut page = net_report::page("Darboux transform", &self.input, &unit, &outcome);
+        if self.report.wanted() {
+            let mut page = net_report::page("Darboux transform", &self.input, &unit);
             net_report::add_net(&mut page, &surface, &unit.to_string())?;
             let chosen = branch;
             let other = if chosen == Branch::Regular { Branch::Other } else { Branch::Regular };
@@ -188,7 +186,7 @@ impl Darboux {
                     Err(error) => return Err(Failure::usage(error)),
                 }
             }
-            outcome.files.push((path, page.to_html().into_bytes()));
+            report_support::add_files(&mut outcome, &self.report, context, page)?;
         }
         Ok(outcome)
     }

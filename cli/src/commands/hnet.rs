@@ -1,11 +1,12 @@
 //! `umbilic hnet QUADS -o OUT`.
 
-use crate::args::{ConfigArgs, ConvergedArgs, OutputArgs};
+use crate::args::{ConfigArgs, ConvergedArgs, OutputArgs, ReportArgs};
 use crate::context::Context;
 use crate::failure::Failure;
 use crate::net_files::{self, NetInput};
 use crate::net_report;
 use crate::outcome::{Outcome, Status};
+use crate::report_support;
 use geom_core::TriMesh;
 use hyperbolic_nets::{
     AsymptoticField, Boundary, BoundaryPolygon, GateReport, HyperbolicNet, JointOptions,
@@ -29,9 +30,8 @@ pub(crate) struct Hnet {
     options: HnetOptions,
     #[command(flatten)]
     config: ConfigArgs,
-    /// Write a report with a 3D view that opens offline
-    #[arg(long, value_name = "FILE.html")]
-    report: Option<PathBuf>,
+    #[command(flatten)]
+    report: ReportArgs,
     #[command(flatten)]
     converged: ConvergedArgs,
 }
@@ -127,9 +127,7 @@ const SAME_SHAPE: f64 = 1e-3;
 
 impl Hnet {
     pub(crate) fn run(self, context: &Context) -> Result<Outcome, Failure> {
-        if let Some(path) = &self.report {
-            crate::args::check_output_path(path)?;
-        }
+        self.report.check()?;
         net_files::check_outputs(&self.output.output, &net_files::NET_OUTPUTS)?;
         let options = self.options.over(self.config.load()?);
         options.check()?;
@@ -176,11 +174,11 @@ impl Hnet {
         }
         outcome.warnings = warnings;
         outcome.require_converged = self.converged.require_converged;
-        if let Some(path) = self.report {
-            let mut page = net_report::page("Hyperbolic net", &self.input, &unit, &outcome);
+        if self.report.wanted() {
+            let mut page = net_report::page("Hyperbolic net", &self.input, &unit);
             net_report::add_net(&mut page, &surface, &unit.to_string())?;
             net_report::add_energies(&mut page, &report);
-            outcome.files.push((path, page.to_html().into_bytes()));
+            report_support::add_files(&mut outcome, &self.report, context, page)?;
         }
         Ok(outcome)
     }

@@ -7,7 +7,6 @@ use crate::common::{message, umbilic};
 use std::collections::BTreeMap;
 use std::fs;
 use std::path::Path;
-use std::process::Command;
 
 /// Runs the program, which must succeed.
 fn succeed(args: &[&str]) {
@@ -114,15 +113,33 @@ fn the_page_of_panels_shows_molds_kinks_and_seams() {
 }
 
 #[test]
+fn nets_and_their_images_are_drawn() {
+    let draw = |command: &str, out: &str, more: &[&str]| {
+        let folder = tempfile::tempdir().unwrap();
+        let out = folder.path().join(out).display().to_string();
+        let figures = folder.path().display().to_string();
+        let args = [command, "fixtures/nets/helicoid.obj", "-o", &out, "--figures", &figures];
+        succeed(&[&args, more].concat());
+        files(folder.path())
+    };
+    for (names, wanted) in [
+        (draw("hnet", "net.ron", &[]), ["hyperbolic-net-h.png", "histogram-kinks.svg"]),
+        (draw("darboux", "a.glb", &["--c", "0.7"]), ["regular-image-k.png", "other-image-k.png"]),
+    ] {
+        for name in wanted {
+            assert!(names.contains_key(name), "{name} is not among {:?}", names.keys());
+        }
+    }
+}
+
+#[test]
 fn two_results_in_one_file_are_refused() {
     let folder = tempfile::tempdir().unwrap();
     let file = folder.path().join("roof.json");
     let same = folder.path().join(".").join("roof.json");
-    let mut command = Command::new(env!("CARGO_BIN_EXE_umbilic"));
-    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
-    command.current_dir(root).args(["convert", "fixtures/roof.ron"]).arg(&file);
-    let output = command.arg("--metrics").arg(&same).output().unwrap();
-    let message = String::from_utf8_lossy(&output.stderr);
+    let [file_name, same] = [&file, &same].map(|path| path.display().to_string());
+    let output = umbilic(&["convert", "fixtures/roof.ron", &file_name, "--metrics", &same]);
+    let message = message(&output);
     assert_eq!(output.status.code(), Some(2), "{message}");
     assert!(message.contains("two results") && message.trim().lines().count() == 1, "{message}");
     assert!(!file.exists());
