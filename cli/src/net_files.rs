@@ -1,7 +1,6 @@
 //! Quad nets in and hyperbolic nets out, for the commands that work on them.
 
 use crate::failure::Failure;
-use crate::outcome::Status;
 use exchange::{Field, LengthUnit, Mesh, Model, NamedSurface, Net, Segment};
 use geom_core::{DVec3, PolyMesh};
 use hyperbolic_nets::{HyperbolicNet, PatchJet, QuadNet, SampledPatches};
@@ -150,16 +149,5 @@ pub(crate) fn sampled_mesh(name: &str, sampled: &SampledPatches) -> Mesh {
         faces: sampled.quads().into_iter().collect(),
         vertex_fields: vec![field("H", |s| s.mean_curvature), field("K", |s| s.gaussian_curvature)],
         ..Mesh::default()
-    }
-}
-
-/// The status of a solver as a command reports it.
-pub(crate) fn status(status: gp_solver::Status) -> Status {
-    match status {
-        gp_solver::Status::Converged => Status::Converged,
-        gp_solver::Status::Stalled => Status::Stalled,
-        gp_solver::Status::IterationLimit => Status::IterationLimit,
-        gp_solver::Status::Interrupted => Status::Interrupted,
-        gp_solver::Status::Infeasible => Status::Infeasible,
     }
 }

@@ -5,15 +5,7 @@ use serde::Serialize;
 use std::path::{Path, PathBuf};
 
 /// How a command ended. Commands that do not iterate always converge.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
-#[serde(rename_all = "snake_case")]
-pub(crate) enum Status {
-    Converged,
-    Stalled,
-    IterationLimit,
-    Interrupted,
-    Infeasible,
-}
+pub(crate) use gp_solver::Status;
 
 /// The result of a command. Nothing is on disk yet: all files are written together at the end,
 /// or none of them.
@@ -70,7 +62,7 @@ impl Outcome {
         let file = MetricsFile {
             schema: 1,
             command,
-            status: self.status,
+            status: self.status.as_str(),
             iterations: self.iterations,
             seconds,
             threads,
@@ -120,7 +112,7 @@ fn is_same_file(a: &Path, b: &Path) -> bool {
 struct MetricsFile<'a> {
     schema: u32,
     command: &'a str,
-    status: Status,
+    status: &'static str,
     iterations: usize,
     seconds: f64,
     threads: usize,

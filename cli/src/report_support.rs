@@ -77,8 +77,7 @@ pub(crate) fn add_files(
     mut report: Report,
 ) -> Result<(), Failure> {
     if outcome.iterations > 0 || outcome.status != Status::Converged {
-        let status = serde_json::to_value(outcome.status).map_err(Failure::other)?;
-        report.status = status.as_str().unwrap_or_default().to_owned();
+        report.status = outcome.status.as_str().to_owned();
     }
     report.warnings.extend(outcome.warnings.iter().cloned());
     if let Value::Object(metrics) = &outcome.metrics {

@@ -209,7 +209,7 @@ impl Darboux {
         let (surface, report) =
             hyperbolic_nets::solve_joint(&net, &reference, &JointOptions::default(), watch)
                 .map_err(refused)?;
-        Ok((surface, net_files::status(report.status), report.iterations))
+        Ok((surface, report.status, report.iterations))
     }
 
     /// The transformation that the flags ask for.

@@ -4,7 +4,7 @@ use crate::args::{ConfigArgs, ConvergedArgs, OutputArgs, ReportArgs};
 use crate::context::Context;
 use crate::failure::Failure;
 use crate::layered;
-use crate::outcome::{Outcome, Status};
+use crate::outcome::Outcome;
 use crate::report_support;
 use curvature_variation::{
     Constraints, Energy, FairOptions, FairProgress, FairReport, Fairing, Functional, Method,
@@ -151,7 +151,7 @@ impl Fair {
             ),
             None => None,
         };
-        let mut outcome = Outcome::new(status(result.report.status), result.report.iterations)
+        let mut outcome = Outcome::new(result.report.status, result.report.iterations)
             .with_input(&self.input)
             .with_metrics(&MetricsObject::new(&result, splines.as_ref()))?;
         outcome.summary = summary(&result, &options);
@@ -269,16 +269,6 @@ fn read_control_mesh(path: &Path, model: &Model) -> Result<geom_core::PolyMesh, 
 fn read_member(path: &Path) -> Result<geom_core::PolyMesh, Failure> {
     let model = exchange::read_model(path).map_err(|e| Failure::input(path, e))?;
     read_control_mesh(path, &model)
-}
-
-fn status(status: gp_solver::Status) -> Status {
-    match status {
-        gp_solver::Status::Converged => Status::Converged,
-        gp_solver::Status::Stalled => Status::Stalled,
-        gp_solver::Status::IterationLimit => Status::IterationLimit,
-        gp_solver::Status::Interrupted => Status::Interrupted,
-        gp_solver::Status::Infeasible => Status::Infeasible,
-    }
 }
 
 /// The `metrics` object.

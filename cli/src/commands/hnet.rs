@@ -158,7 +158,7 @@ impl Hnet {
             warnings.push(NetWarning::boundary(&net, moved).to_string());
         }
         let metrics = metrics(&surface, &gates, &measures, moved);
-        let mut outcome = Outcome::new(net_files::status(report.status), report.iterations)
+        let mut outcome = Outcome::new(report.status, report.iterations)
             .with_input(&self.input)
             .with_metrics(&metrics)?;
         for path in self.output.output {

@@ -6,7 +6,7 @@ use crate::args::{
 use crate::context::Context;
 use crate::failure::Failure;
 use crate::layered;
-use crate::outcome::{Outcome, Status};
+use crate::outcome::Outcome;
 use crate::report_support;
 use crate::report_support::weingarten::weingarten_report;
 use bspline::BsplineSurface;
@@ -198,7 +198,7 @@ impl Run {
     /// Status, metrics and summary.
     pub(crate) fn outcome(&self, unit: &LengthUnit) -> Result<Outcome, Failure> {
         let report = &self.optimized.report;
-        let mut outcome = Outcome::new(status(report.status), report.iterations)
+        let mut outcome = Outcome::new(report.status, report.iterations)
             .with_metrics(&MetricsObject::new(&self.optimized))?;
         outcome.summary = self.summary(unit);
         Ok(outcome)
@@ -242,16 +242,6 @@ impl Run {
             after.gaussian_curvature_min, after.gaussian_curvature_max
         ));
         lines
-    }
-}
-
-fn status(status: weingarten::Status) -> Status {
-    match status {
-        weingarten::Status::Converged => Status::Converged,
-        weingarten::Status::Stalled => Status::Stalled,
-        weingarten::Status::IterationLimit => Status::IterationLimit,
-        weingarten::Status::Interrupted => Status::Interrupted,
-        weingarten::Status::Infeasible => Status::Infeasible,
     }
 }
 

@@ -22,6 +22,7 @@ pub use error::SplineError;
 pub use fit::{FitError, fit_curve, fit_surface};
 pub use grid_fit::{GridFit, GridFitOptions, fit_grid};
 pub use knots::{Degree, KnotError, KnotVector};
+pub use rational::BINOMIAL;
 pub use refine::BezierPiece;
 pub use surface::BsplineSurface;
 pub use table::{BasisTable, SampleGrid, SpanSamples};

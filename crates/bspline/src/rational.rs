@@ -4,7 +4,8 @@ use crate::basis::MAX_DERIVATIVE;
 use geom_core::SurfaceJet;
 use glam::{DVec3, DVec4};
 
-const BINOMIAL: [[f64; 5]; 5] = [
+/// Binomial coefficients `n` over `k` at `[n][k]`, for the product rule up to fourth derivatives.
+pub const BINOMIAL: [[f64; MAX_DERIVATIVE + 1]; MAX_DERIVATIVE + 1] = [
     [1.0, 0.0, 0.0, 0.0, 0.0],
     [1.0, 1.0, 0.0, 0.0, 0.0],
     [1.0, 2.0, 1.0, 0.0, 0.0],

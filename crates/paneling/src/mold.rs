@@ -100,6 +100,20 @@ pub(crate) struct Height {
     pub(crate) fyy: f64,
 }
 
+impl Height {
+    /// From a Taylor expansion whose first two variables are x and y.
+    fn of<const N: usize>(z: Taylor<N>) -> Self {
+        Self {
+            f: z.value,
+            fx: z.first[0],
+            fy: z.first[1],
+            fxx: z.second[0][0],
+            fxy: z.second[0][1],
+            fyy: z.second[1][1],
+        }
+    }
+}
+
 /// Derivatives of `f, f_x, f_y` in the parameters of the mold.
 pub(crate) type ParameterRows = [[f64; MAX_PARAMETERS]; 3];
 
@@ -157,25 +171,8 @@ impl Mold {
                     fyy: 2.0 * c + 2.0 * g * x + 6.0 * h * y,
                 }
             }
-            MoldType::Torus => self.torus(x, y).map_or(UNREACHED, |z| Height {
-                f: z.value,
-                fx: z.first[0],
-                fy: z.first[1],
-                fxx: z.second[0][0],
-                fxy: z.second[0][1],
-                fyy: z.second[1][1],
-            }),
-            MoldType::Cylinder | MoldType::Sphere => {
-                let z = self.round(x, y);
-                Height {
-                    f: z.value,
-                    fx: z.first[0],
-                    fy: z.first[1],
-                    fxx: z.second[0][0],
-                    fxy: z.second[0][1],
-                    fyy: z.second[1][1],
-                }
-            }
+            MoldType::Torus => self.torus(x, y).map_or(UNREACHED, Height::of),
+            MoldType::Cylinder | MoldType::Sphere => Height::of(self.round(x, y)),
         }
     }
 

@@ -3,6 +3,8 @@
 //! With `A = Σ w c N`, `W = Σ w N` and `R = 1/W` the surface is `s = A R`. The weights stay fixed, so a
 //! derivative of `s` is a combination of derivatives of `A` with fixed coefficients (Leibniz).
 
+use bspline::BINOMIAL;
+
 use crate::axis::Axis;
 use crate::kernel::{FOURTH, ORDERS, order_index};
 
@@ -66,14 +68,6 @@ impl Rational {
         }
     }
 }
-
-const BINOMIAL: [[f64; 5]; 5] = [
-    [1.0, 0.0, 0.0, 0.0, 0.0],
-    [1.0, 1.0, 0.0, 0.0, 0.0],
-    [1.0, 2.0, 1.0, 0.0, 0.0],
-    [1.0, 3.0, 3.0, 1.0, 0.0],
-    [1.0, 4.0, 6.0, 4.0, 1.0],
-];
 
 /// The terms of `(f g)^(a,b)`: index in `f`, index in `g`, coefficient (Leibniz).
 fn leibniz(a: usize, b: usize) -> impl Iterator<Item = (usize, usize, f64)> {
