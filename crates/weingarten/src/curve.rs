@@ -115,10 +115,14 @@ impl DiagramCurve {
         out
     }
 
+    /// Points along the whole curve, both ends included.
+    pub(crate) fn points(&self) -> Vec<[f64; 2]> {
+        (0..=CANDIDATES).map(|k| self.derivatives(k as f64 / CANDIDATES as f64)[0]).collect()
+    }
+
     /// The foot points of `points`.
     pub(crate) fn feet(&self, points: &[[f64; 2]]) -> Vec<Foot> {
-        let candidates: Vec<[f64; 2]> =
-            (0..=CANDIDATES).map(|k| self.derivatives(k as f64 / CANDIDATES as f64)[0]).collect();
+        let candidates = self.points();
         points.iter().map(|&p| self.foot(p, &candidates)).collect()
     }
 

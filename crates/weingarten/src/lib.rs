@@ -33,6 +33,7 @@ mod grid;
 mod kernel;
 mod level;
 mod lifted;
+mod locus;
 mod metrics;
 mod optimize;
 mod options;
@@ -47,6 +48,7 @@ mod tests;
 pub use checkpoint::Checkpoint;
 pub use error::WeingartenError;
 pub use gp_solver::Status;
+pub use locus::RelationLocus;
 pub use metrics::Metrics;
 pub use optimize::{
     LevelReport, Optimized, Progress, WeingartenReport, optimize, optimize_observed,

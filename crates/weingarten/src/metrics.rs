@@ -6,6 +6,7 @@ use glam::DVec3;
 
 use crate::field::{Sample, samples};
 use crate::grid::SampleGrid;
+use crate::locus::RelationLocus;
 use crate::target::Target;
 
 /// A curvature counts as constant if it varies by no more than this fraction of its size.
@@ -86,6 +87,12 @@ impl<'a> Meter<'a> {
             gaussian_curvature_max: k.1,
             relation_rms: target.map_or(0.0, |t| t.rms(&rescaled(here, self.unit))),
         }
+    }
+
+    /// Where the relation holds in the diagram, fitted to `surface` if it is one to fit.
+    pub(crate) fn locus(&self, surface: &BsplineSurface, target: &Target) -> RelationLocus {
+        let grid = SampleGrid::midpoints(surface, self.samples);
+        target.locus(&rescaled(samples(&grid, &coordinates(surface)), self.unit))
     }
 
     fn alignment(

@@ -14,6 +14,7 @@ use crate::field::Sample;
 use crate::grid::SampleGrid;
 use crate::level::{Level, regular_samples};
 use crate::lifted;
+use crate::locus::RelationLocus;
 use crate::metrics::{Meter, Metrics, control_points, coordinates};
 use crate::options::{Formulation, WeingartenOptions};
 
@@ -121,6 +122,9 @@ pub struct Optimized {
     pub before: Metrics,
     /// How Weingarten the result is.
     pub after: Metrics,
+    /// Where the relation asked for holds in the curvature diagram, with the coefficients it ended
+    /// with; none for [`crate::Relation::Free`].
+    pub relation: Option<RelationLocus>,
     /// What the solver did.
     pub report: WeingartenReport,
 }
@@ -256,6 +260,7 @@ fn finish(
     Ok(Optimized {
         before: meter.measure(input, target.as_ref()),
         after: meter.measure(&surface, target.as_ref()),
+        relation: target.as_ref().map(|target| meter.locus(&surface, target)),
         report: WeingartenReport { status, iterations, levels, unit: level.unit },
         surface,
     })

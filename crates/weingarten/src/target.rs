@@ -2,6 +2,7 @@
 
 use crate::curve::{DiagramCurve, principal_axis};
 use crate::field::Sample;
+use crate::locus::RelationLocus;
 use crate::relation::Relation;
 
 /// Least standard deviation of `H` and `K` that rows are scaled with, relative to the size of the
@@ -15,6 +16,8 @@ const UMBILIC_SMOOTHING: f64 = 1e-3;
 #[derive(Clone, Debug)]
 pub(crate) struct Target {
     kind: Kind,
+    /// Working lengths per length of the model.
+    unit: f64,
     /// Natural sizes of `H` and `K`.
     size: [f64; 2],
     /// Standard deviations at the start.
@@ -71,7 +74,28 @@ impl Target {
             }
             Relation::CurveFit => Kind::CurveFit,
         };
-        Some(Self { kind, size, deviation })
+        Some(Self { kind, unit, size, deviation })
+    }
+
+    /// Where the relation holds, in units of the model; what is fitted is fitted to `samples` (on
+    /// the working scale).
+    pub(crate) fn locus(&self, samples: &[Sample]) -> RelationLocus {
+        let (h, k) = (1.0 / self.unit, 1.0 / (self.unit * self.unit));
+        let line = |[a, b, c]: [f64; 3]| RelationLocus::Line { a: a * h, b: b * k, c };
+        let curve = |curve: &DiagramCurve| {
+            let scaled = |[x, y]: [f64; 2]| [x * self.deviation[0] / h, y * self.deviation[1] / k];
+            RelationLocus::Curve(curve.points().into_iter().map(scaled).collect())
+        };
+        match &self.kind {
+            &Kind::Affine(row) => line(row),
+            &Kind::Ratio(ratio) => RelationLocus::Ratio(ratio),
+            Kind::LinearFit => line(self.line(samples)),
+            Kind::Curve(given) => curve(given),
+            Kind::CurveFit => match DiagramCurve::fit(&self.diagram(samples)) {
+                Some(fitted) => curve(&fitted),
+                None => line(self.line(samples)),
+            },
+        }
     }
 
     /// Whether the rows change from iterate to iterate.

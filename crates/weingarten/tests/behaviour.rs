@@ -7,8 +7,8 @@ use fixtures::surfaces::{Shape, plane, sphere_cap, torus_patch};
 use geom_core::{DVec3, assert_close};
 use glam::DQuat;
 use weingarten::{
-    Border, Formulation, Move, Optimized, Relation, Status, Weights, WeingartenError,
-    WeingartenOptions, optimize, optimize_observed,
+    Border, Formulation, Metrics, Move, Optimized, Relation, RelationLocus, Status, Weights,
+    WeingartenError, WeingartenOptions, optimize, optimize_observed,
 };
 
 fn few(iterations: usize) -> WeingartenOptions {
@@ -151,6 +151,45 @@ fn relations_are_approached() {
     assert!(after < 0.05 * before, "ratio: {before} -> {after}");
     let (before, after, _) = with(Relation::ConstantGauss(-0.05), 1e-3, 20);
     assert!(after < 0.2 * before, "gauss: {before} -> {after}");
+}
+
+#[test]
+fn the_locus_of_a_relation_is_told_in_the_model_s_units() {
+    let vault = Shape::Vault.surface(10, 10, 4, 4);
+    let locus = |relation: Relation| {
+        let result = run(&vault, &WeingartenOptions { relation, ..few(1) });
+        let Metrics { mean_curvature_min: low, mean_curvature_max: high, .. } = result.after;
+        (result.relation, [low, high])
+    };
+    assert_eq!(locus(Relation::Free).0, None);
+    let given = [
+        (Relation::Minimal, "H = 0"),
+        (Relation::ConstantMean(-0.125), "H = -0.125"),
+        (Relation::Developable, "K = 0"),
+        (Relation::ConstantGauss(-0.05), "K = -0.05"),
+        (Relation::Linear(0.5, 2.0, -0.25), "K = -0.25 H + 0.125"),
+        (Relation::Ratio(-1.5), "κ₁ = -1.5 κ₂"),
+    ];
+    for (relation, want) in given {
+        assert_eq!(locus(relation).0.unwrap().to_string(), want);
+    }
+    // The fitted value is the mean over the input; the line passes through the cloud.
+    let (fitted, [low, high]) = locus(Relation::ConstantMeanFit);
+    assert!(
+        fitted.unwrap().points([low, high], [0.0, 0.1]).iter().all(|p| p[0] > low && p[0] < high)
+    );
+    // A curve starts and ends at its first and last control point.
+    let control = vec![[-0.2, 0.0], [0.0, 0.3], [0.1, -0.1], [0.2, 0.05]];
+    let Some(RelationLocus::Curve(points)) = locus(Relation::Curve(control.clone())).0 else {
+        panic!("a curve stays a curve");
+    };
+    for (got, want) in [(points[0], control[0]), (points[points.len() - 1], control[3])] {
+        assert_close(got[0], want[0], 1e-12);
+        assert_close(got[1], want[1], 1e-12);
+    }
+    // Its control polygon is wider than the curve itself.
+    let highest = points.iter().map(|p| p[1]).fold(f64::MIN, f64::max);
+    assert!(highest > 0.05 && highest < 0.2, "{highest}");
 }
 
 #[test]
