@@ -5,7 +5,8 @@ use crate::panels::PanelSet;
 use crate::residuals::{sample_mold_rows, sample_residual};
 use crate::small::{accumulate, factor, solve_spd};
 use rayon::prelude::*;
-use std::collections::HashMap;
+use std::cmp::Reverse;
+use std::collections::{BinaryHeap, HashMap};
 
 /// Second coordinate of the curvature diagram in which the grid clusters; the first is `H`.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -168,55 +169,40 @@ pub(crate) fn shapes(features: &[Feature], count: usize, iterations: usize) -> C
     }
 }
 
-/// Most shapes that are considered as molds by [`cover`].
-const MAX_CANDIDATES: usize = 2000;
+/// Most shapes that are considered as molds by [`cover`], as a multiple of the molds wanted and at
+/// least [`LEAST_CANDIDATES`].
+const CANDIDATES_PER_MOLD: usize = 4;
+const LEAST_CANDIDATES: usize = 2000;
+/// Halvings of the tolerance.
+const HALVINGS: usize = 24;
 
 /// Greedy covering: the shapes of some panels become molds such that every panel is within a
 /// tolerance of one, and the tolerance is the smallest for which `count` suffice.
 pub(crate) fn cover(features: &[Feature], count: usize) -> Clusters {
-    let n = features.len();
-    let step = n.div_ceil(MAX_CANDIDATES);
+    let wanted = LEAST_CANDIDATES.max(CANDIDATES_PER_MOLD * count);
+    let step = features.len().div_ceil(wanted).max(1);
     let candidates: Vec<Feature> = features.iter().copied().step_by(step).collect();
-    let distances: Vec<Vec<f64>> = candidates
-        .par_iter()
-        .map(|c| features.iter().map(|x| distance(x, c).0).collect())
-        .collect();
-    let chosen = |tolerance: f64| -> Option<Vec<usize>> {
-        let mut open = vec![true; n];
-        let mut left = n;
-        let mut chosen = Vec::new();
-        while left > 0 {
-            if chosen.len() == count {
-                return None;
-            }
-            let gain = |row: &Vec<f64>| {
-                row.iter().zip(&open).filter(|(d, open)| **open && **d <= tolerance).count()
-            };
-            let gains: Vec<usize> = distances.par_iter().map(gain).collect();
-            let best = (0..gains.len()).max_by_key(|&c| (gains[c], usize::MAX - c))?;
-            if gains[best] == 0 {
-                return None;
-            }
-            for p in 0..n {
-                if open[p] && distances[best][p] <= tolerance {
-                    open[p] = false;
-                    left -= 1;
-                }
-            }
-            chosen.push(best);
+    // Only shapes within the largest tolerance that is needed have to be remembered; equal shapes
+    // differ by rounding.
+    let square = |x: &Feature| x.iter().map(|v| v * v).sum::<f64>();
+    let rounding = 1e-13 * features.iter().map(square).fold(f64::MIN_POSITIVE, f64::max);
+    let mut high = spread_radius(features, count).max(rounding);
+    let (reached, mut chosen) = loop {
+        let reached = reached_by(features, &candidates, high);
+        if let Some(chosen) = greedy_cover(&reached, features.len(), count, high) {
+            break (reached, chosen);
         }
-        Some(chosen)
+        high *= 2.0;
     };
-    let (mut low, mut high) = (0.0, distances.iter().flatten().copied().fold(0.0, f64::max));
-    let mut centers = chosen(high).unwrap_or_else(|| vec![0]);
-    for _ in 0..24 {
+    let mut low = 0.0;
+    for _ in 0..HALVINGS {
         let middle = 0.5 * (low + high);
-        match chosen(middle) {
-            Some(found) => (centers, high) = (found, middle),
+        match greedy_cover(&reached, features.len(), count, middle) {
+            Some(found) => (chosen, high) = (found, middle),
             None => low = middle,
         }
     }
-    let centers: Vec<Feature> = centers.iter().map(|&c| candidates[c]).collect();
+    let centers: Vec<Feature> = chosen.iter().map(|&c| candidates[c]).collect();
     let mut nearest = assign(features, &centers);
     fill_empty(&mut nearest, centers.len());
     Clusters {
@@ -224,6 +210,77 @@ pub(crate) fn cover(features: &[Feature], count: usize) -> Clusters {
         turned: nearest.iter().map(|x| x.2).collect(),
         count: centers.len(),
     }
+}
+
+/// Shapes a candidate may stand for, nearest first: distance and number.
+type Reached = Vec<(f64, u32)>;
+
+fn reached_by(features: &[Feature], candidates: &[Feature], limit: f64) -> Vec<Reached> {
+    let near = |center: &Feature| {
+        let all = features.iter().zip(0..).map(|(x, p)| (distance(x, center).0, p));
+        let mut near: Reached = all.filter(|(d, _)| *d <= limit).collect();
+        near.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+        near
+    };
+    candidates.par_iter().map(near).collect()
+}
+
+/// How far the shapes are from the nearest of `count` of them, each the furthest from those before.
+fn spread_radius(features: &[Feature], count: usize) -> f64 {
+    let mut distances = vec![f64::INFINITY; features.len()];
+    let mut next = 0;
+    let mut radius = 0.0;
+    for _ in 0..count {
+        let center = features[next];
+        distances
+            .par_iter_mut()
+            .with_min_len(2048)
+            .zip(features)
+            .for_each(|(d, x)| *d = d.min(distance(x, &center).0));
+        next = (0..distances.len()).fold(0, |a, b| if distances[b] > distances[a] { b } else { a });
+        radius = distances[next];
+    }
+    radius
+}
+
+/// The candidates that cover all `shapes` shapes within the tolerance, each the one that covers
+/// most of what is left (the first of several); `None` if `count` do not suffice.
+///
+/// What a candidate would cover only ever gets less, so its last count is an upper bound, and only
+/// the candidate with the largest bound has to be counted again.
+fn greedy_cover(
+    reached: &[Reached],
+    shapes: usize,
+    count: usize,
+    tolerance: f64,
+) -> Option<Vec<usize>> {
+    let within = |c: usize| {
+        let near = &reached[c];
+        near[..near.partition_point(|(d, _)| *d <= tolerance)].iter().map(|(_, p)| *p as usize)
+    };
+    let bounds = (0..reached.len()).map(|c| (within(c).len(), Reverse(c)));
+    let mut bounds: BinaryHeap<(usize, Reverse<usize>)> = bounds.collect();
+    let mut open = vec![true; shapes];
+    let mut left = shapes;
+    let mut chosen = Vec::new();
+    while left > 0 {
+        let (bound, Reverse(c)) = bounds.pop()?;
+        let gain = within(c).filter(|&p| open[p]).count();
+        if gain == 0 {
+            continue;
+        }
+        if gain < bound {
+            bounds.push((gain, Reverse(c)));
+            continue;
+        }
+        if chosen.len() == count {
+            return None;
+        }
+        within(c).for_each(|p| open[p] = false);
+        left -= gain;
+        chosen.push(c);
+    }
+    Some(chosen)
 }
 
 /// The nearest center of every shape.
@@ -356,6 +413,54 @@ mod tests {
         let (d, turned) = distance(&a, &b);
         assert!(d < 1e-14 && turned);
         assert!(!distance(&a, &a).1);
+    }
+
+    #[test]
+    fn the_lazy_cover_is_the_greedy_one() {
+        let features: Vec<Feature> = (0..400)
+            .map(|k| std::array::from_fn(|i| ((k * (i + 3)) as f64 * 0.37).sin()))
+            .collect();
+        let candidates: Vec<Feature> = features.iter().copied().step_by(3).collect();
+        let reached = reached_by(&features, &candidates, f64::INFINITY);
+        for tolerance in [0.5, 1.5, 3.0, 6.0] {
+            let mut open = vec![true; features.len()];
+            let mut greedy = Vec::new();
+            while open.contains(&true) {
+                let covers = |c: usize, p: usize| {
+                    open[p] && distance(&features[p], &candidates[c]).0 <= tolerance
+                };
+                let gain = |c: usize| (0..features.len()).filter(|&p| covers(c, p)).count();
+                let gains: Vec<usize> = (0..candidates.len()).map(gain).collect();
+                let best = (0..gains.len()).max_by_key(|&c| (gains[c], Reverse(c))).unwrap();
+                if gains[best] == 0 {
+                    break;
+                }
+                let covered: Vec<usize> =
+                    (0..features.len()).filter(|&p| covers(best, p)).collect();
+                covered.into_iter().for_each(|p| open[p] = false);
+                greedy.push(best);
+            }
+            let is_complete = !open.contains(&true);
+            let lazy = greedy_cover(&reached, features.len(), greedy.len(), tolerance);
+            assert_eq!(lazy, is_complete.then(|| greedy.clone()));
+            if is_complete {
+                let fewer = greedy_cover(&reached, features.len(), greedy.len() - 1, tolerance);
+                assert_eq!(fewer, None);
+            }
+        }
+    }
+
+    #[test]
+    fn a_cover_uses_at_most_the_wanted_number_and_leaves_none_empty() {
+        let features: Vec<Feature> = (0..200)
+            .map(|k| std::array::from_fn(|i| (k as f64 * 0.01 * (i + 1) as f64).cos()))
+            .collect();
+        for count in [1, 7, 40, 200] {
+            let clusters = cover(&features, count);
+            assert!(clusters.count <= count && clusters.count > count / 3, "{}", clusters.count);
+            assert!((0..clusters.count).all(|c| clusters.labels.contains(&c)));
+        }
+        assert_eq!(cover(&[[1.0; 7]; 6], 3).count, 1);
     }
 
     #[test]
