@@ -48,7 +48,7 @@ fn bad_input_is_one_sentence() {
         "layout vertex 1 at (3, 0) is outside the unit square, which stands for the whole surface; scale the layout",
     );
     layout(&crossed, "layout face 0 is not a simple polygon of positive area");
-    layout(&overlap, "layout ");
+    layout(&overlap, "layout faces 0 and 1 overlap; every place belongs to one panel only");
     layout(&raised, "layout vertex 2 has z = 0.5; the layout is a mesh in the plane z = 0");
     layout("no/such.obj", "cannot be read");
     refused(

@@ -18,12 +18,12 @@ pub enum PanelingError {
     TooFewAround { direction: &'static str, needed: usize, found: usize },
     /// A pattern whose rows must come in pairs around a closed surface.
     #[error(
-        "this layout needs an even number of panels around the closed direction {direction}, found {found}"
+        "this layout needs an even number of panels around the closed direction {direction}, found {found}; take one more or one less"
     )]
     OddAround { direction: &'static str, found: usize },
     /// A layout mesh that is not in the plane z = 0.
     #[error(
-        "layout vertex {vertex} has z = {z}; the layout is a mesh in the plane z = 0 over the unit square"
+        "layout vertex {vertex} has z = {z}; the layout is a mesh in the plane z = 0 over the unit square, so flatten it"
     )]
     NotPlanar { vertex: usize, z: f64 },
     /// A layout mesh that leaves the unit square.
@@ -39,9 +39,6 @@ pub enum PanelingError {
     /// Two layout faces that overlap.
     #[error("layout faces {first} and {second} overlap; every place belongs to one panel only")]
     Overlap { first: usize, second: usize },
-    /// A mesh edge with more than two faces.
-    #[error("layout edge {from}-{to} has more than two faces; split the layout there")]
-    NonManifold { from: usize, to: usize },
     /// More molds than panels.
     #[error("{molds} molds for {panels} panels; ask for at most one per panel, and at least one")]
     MoldCount { molds: usize, panels: usize },

@@ -14,7 +14,7 @@ pub(crate) fn area(polygon: &[Corner]) -> f64 {
     0.5 * (0..n).map(cross).sum::<f64>()
 }
 
-/// Refuses polygons that are not simple or turned over, that overlap, and edges of more than two.
+/// Refuses polygons that are not simple or turned over, or that overlap.
 pub(crate) fn check(panels: &[Vec<Corner>]) -> Result<(), PanelingError> {
     let mut edges: HashMap<(usize, usize), usize> = HashMap::new();
     for (face, panel) in panels.iter().enumerate() {
@@ -30,8 +30,9 @@ pub(crate) fn check(panels: &[Vec<Corner>]) -> Result<(), PanelingError> {
         }
         for k in 0..n {
             let (from, to) = (panel[k].vertex, panel[(k + 1) % n].vertex);
-            if edges.insert((from, to), face).is_some() {
-                return Err(PanelingError::NonManifold { from, to });
+            // Both lie to the left of the edge they share.
+            if let Some(first) = edges.insert((from, to), face) {
+                return Err(PanelingError::Overlap { first, second: face });
             }
         }
     }
