@@ -158,6 +158,8 @@ impl Panelings {
         let unit = report.length_unit.clone();
         let (set, paneling) = &self.after;
         report.title = "A roof made a Weingarten surface and cut into panels".to_owned();
+        let (first_set, first) = &self.before;
+        report.stages.push(panel_view("panels before", first_set, first, &unit)?);
         report.stages.push(panel_view("panels after", set, paneling, &unit)?);
         let series = self.all().map(|(name, _, paneling)| (name, paneling));
         report.histograms.push(kink_histogram(&series, None));

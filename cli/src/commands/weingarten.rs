@@ -205,7 +205,7 @@ impl Run {
     }
 
     fn summary(&self, unit: &LengthUnit) -> Vec<String> {
-        let Optimized { surface, before, after, report } = &self.optimized;
+        let Optimized { surface, before, after, report, .. } = &self.optimized;
         let mut lines = vec![format!(
             "{} x {} control points, {} steps, {}",
             surface.n_u(),

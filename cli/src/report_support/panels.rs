@@ -46,8 +46,12 @@ pub(crate) fn panel_view(
     let gap = spread(&|p| worst[p][1]);
     let gap = ScalarField::magnitude("gap", "worst gap of a panel", length_unit, gap);
     let deviation = spread(&|p| paneling.measures.deviations[p]);
-    let mut deviation = ScalarField::deviation(deviation, length_unit);
-    deviation.label = "deviation from the design".to_owned();
+    let deviation = ScalarField::magnitude(
+        "panel-deviation",
+        "deviation from the design",
+        length_unit,
+        deviation,
+    );
 
     let kinds = |m: usize| format!("mold {m} ({})", paneling.molds[m].kind.name());
     let names = (0..paneling.molds.len()).map(kinds).collect();

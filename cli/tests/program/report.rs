@@ -77,12 +77,45 @@ fn the_page_of_the_demo_is_small_and_repeats() {
         "Energies per iteration",
         "Kinks along seams",
         "Worst seams of panels after",
-        "stage-2",
+        "stage-3",
         "diagram_area",
-        "panels_before.kink_median_deg",
+        "panels_before_cost_driven",
+        "<th scope=\"row\">kink_median_deg</th>",
     ];
     for part in parts {
         assert!(pages[0].contains(part), "{part}");
+    }
+}
+
+#[test]
+fn relations_are_drawn_over_the_diagrams_of_both_surfaces() {
+    for (relation, curve) in [
+        ("minimal", "H = 0"),
+        ("linear=1,2,-0.3", "K = −0.5 H + 0.15"),
+        ("ratio=-1.5", "κ₁ = −1.5 κ₂"),
+    ] {
+        let folder = tempfile::tempdir().unwrap();
+        let [out, page] = ["out.ron", "page.html"].map(|name| folder.path().join(name));
+        succeed(&[
+            "weingarten",
+            "fixtures/saddle.ron",
+            "-o",
+            out.to_str().unwrap(),
+            "--iterations",
+            "1",
+            "--relation",
+            relation,
+            "--report",
+            page.to_str().unwrap(),
+            "--figures",
+            folder.path().to_str().unwrap(),
+        ]);
+        let page = fs::read_to_string(&page).unwrap();
+        assert!(page.contains(&format!("\"relations\":[{{\"name\":\"{curve}\"")), "{relation}");
+        let figure = fs::read_to_string(folder.path().join("after-diagram.svg")).unwrap();
+        for text in [curve, ">before<", ">after<", "K = H²"] {
+            assert!(figure.contains(text), "{relation}: {text}");
+        }
     }
 }
 

@@ -3,28 +3,40 @@
 use crate::colormap::{self, TABLE};
 use crate::numbers::{axis_name, format_number, quantile, sorted_finite, ticks};
 use crate::svg::{Anchor, GRID, INK, MARK, SOFT, Svg};
-use crate::{FieldScale, RelationCurve, SurfaceView};
+use crate::{FieldScale, RelationCurve, ScalarField, SurfaceView};
 
 const SIZE: f64 = 460.0;
 const LEFT: f64 = 74.0;
 const TOP: f64 = 14.0;
 const RIGHT: f64 = 16.0;
-const BOTTOM: f64 = 48.0;
+const BOTTOM: f64 = 72.0;
+/// Colour of the points behind.
+const BEHIND: &str = "#b3b5ba";
 /// Dots of a figure at most; of more vertices every n-th is drawn.
 const DOTS: usize = 20_000;
 /// Shades the dots are grouped into, so that each shade is one path.
 const SHADES: usize = 32;
 
-/// The diagram coloured by K, or `None` without curvatures.
-pub(crate) fn diagram_svg(view: &SurfaceView, relations: &[RelationCurve]) -> Option<String> {
+/// The diagram coloured by K over the points of the view `behind` in grey, or `None` without
+/// curvatures.
+pub(crate) fn diagram_svg(
+    view: &SurfaceView,
+    behind: Option<&SurfaceView>,
+    relations: &[RelationCurve],
+) -> Option<String> {
     let (h, k) = (view.field("H")?, view.field("K")?);
+    let earlier = behind.and_then(|b| Some((b, b.field("H")?, b.field("K")?)));
     let most = |values: &[f64]| {
         let sorted = sorted_finite(values.iter().map(|v| v.abs()));
         quantile(&sorted, 0.99)
     };
     let k_most = Some(most(&k.values)).filter(|m| *m > 0.0).unwrap_or(1.0);
-    let x = axis_range(&h.values, k_most.sqrt());
-    let y = axis_range(&k.values, k_most);
+    let both = |values: &[f64], other: Option<&ScalarField>| {
+        let other = other.map_or(&[][..], |field| &field.values);
+        values.iter().chain(other).copied().collect::<Vec<f64>>()
+    };
+    let x = axis_range(&both(&h.values, earlier.map(|e| e.1)), k_most.sqrt());
+    let y = axis_range(&both(&k.values, earlier.map(|e| e.2)), k_most);
     let (right, base) = (SIZE - RIGHT, SIZE - BOTTOM);
     let place = |a: f64, b: f64| {
         let across = LEFT + (right - LEFT) * (a - x[0]) / (x[1] - x[0]);
@@ -48,6 +60,12 @@ pub(crate) fn diagram_svg(view: &SurfaceView, relations: &[RelationCurve]) -> Op
     svg.text([middle_x, base + 38.0], Anchor::Middle, INK, &axis_name("H", &h.unit));
     svg.upward_text([14.0, middle_y], INK, &axis_name("K", &k.unit));
 
+    if let Some((_, h, k)) = earlier {
+        let step = h.values.len().div_ceil(DOTS).max(1);
+        let pairs = h.values.iter().zip(&k.values).step_by(step);
+        let dots: Vec<[f64; 2]> = pairs.map(|(a, b)| place(*a, *b)).filter(inside).collect();
+        svg.dots(&dots, BEHIND, 2.0);
+    }
     let mut shades = vec![Vec::new(); SHADES];
     let step = h.values.len().div_ceil(DOTS).max(1);
     for (a, b) in h.values.iter().zip(&k.values).step_by(step) {
@@ -66,17 +84,87 @@ pub(crate) fn diagram_svg(view: &SurfaceView, relations: &[RelationCurve]) -> Op
     }
     // No point of a surface lies above the parabola K = H² of umbilic points.
     let parabola = (0..=100).map(|i| x[0] + (x[1] - x[0]) * f64::from(i) / 100.0);
-    let parabola: Vec<[f64; 2]> = parabola.map(|a| place(a, a * a)).filter(inside).collect();
-    svg.polyline(&parabola, SOFT, 0.8);
+    let parabola: Vec<[f64; 2]> = parabola.map(|a| place(a, a * a)).collect();
+    let window = [[LEFT, TOP], [right, base]];
+    for piece in clipped(&parabola, window) {
+        svg.polyline(&piece, SOFT, 0.8);
+    }
     for relation in relations {
-        let points: Vec<[f64; 2]> =
-            relation.points.iter().map(|[a, b]| place(*a, *b)).filter(inside).collect();
-        svg.polyline(&points, MARK, 1.6);
-        if let Some([across, up]) = points.get(points.len() / 2) {
-            svg.text([across + 7.0, up - 6.0], Anchor::Start, MARK, &relation.name);
+        let points: Vec<[f64; 2]> = relation.points.iter().map(|[a, b]| place(*a, *b)).collect();
+        for piece in clipped(&points, window) {
+            svg.polyline(&piece, MARK, 1.6);
         }
     }
+    let mut key = Key { svg: &mut svg, at: [LEFT, SIZE - 8.0] };
+    key.entry(Swatch::Dot("#2a63a5"), view.name());
+    if let Some((view, ..)) = earlier {
+        key.entry(Swatch::Dot(BEHIND), view.name());
+    }
+    for relation in relations {
+        key.entry(Swatch::Line(MARK, 1.6), &relation.name);
+    }
+    key.entry(Swatch::Line(SOFT, 0.8), "K = H²");
     Some(svg.finish())
+}
+
+/// What the dots and curves are, in a row below the axes.
+struct Key<'s> {
+    svg: &'s mut Svg,
+    at: [f64; 2],
+}
+
+enum Swatch {
+    Dot(&'static str),
+    Line(&'static str, f64),
+}
+
+impl Key<'_> {
+    fn entry(&mut self, swatch: Swatch, text: &str) {
+        let [x, y] = self.at;
+        let width = match swatch {
+            Swatch::Dot(colour) => {
+                self.svg.dots(&[[x + 4.0, y - 4.0]], colour, 7.0);
+                13.0
+            }
+            Swatch::Line(colour, width) => {
+                self.svg.line([x, y - 4.0], [x + 18.0, y - 4.0], colour, width);
+                23.0
+            }
+        };
+        self.svg.text([x + width, y], Anchor::Start, INK, text);
+        // About the width of the text, which depends on the reader's font.
+        self.at[0] += width + 6.4 * text.chars().count() as f64 + 14.0;
+    }
+}
+
+/// The pieces of a polyline inside the box from `low` to `high` (Liang and Barsky's clipping).
+fn clipped(points: &[[f64; 2]], [low, high]: [[f64; 2]; 2]) -> Vec<Vec<[f64; 2]>> {
+    let mut pieces: Vec<Vec<[f64; 2]>> = Vec::new();
+    let mut joined = false;
+    for pair in points.windows(2) {
+        let (a, step) = (pair[0], [pair[1][0] - pair[0][0], pair[1][1] - pair[0][1]]);
+        let (mut from, mut to) = (0.0_f64, 1.0_f64);
+        for axis in 0..2 {
+            let ends = [(low[axis] - a[axis]) / step[axis], (high[axis] - a[axis]) / step[axis]];
+            if step[axis] != 0.0 {
+                from = from.max(ends[0].min(ends[1]));
+                to = to.min(ends[0].max(ends[1]));
+            } else if !(low[axis]..=high[axis]).contains(&a[axis]) {
+                to = -1.0;
+            }
+        }
+        if !(from <= to) {
+            joined = false;
+            continue;
+        }
+        let at = |t: f64| [a[0] + t * step[0], a[1] + t * step[1]];
+        match pieces.last_mut() {
+            Some(piece) if joined && from == 0.0 => piece.push(at(to)),
+            _ => pieces.push(vec![at(from), at(to)]),
+        }
+        joined = to == 1.0;
+    }
+    pieces
 }
 
 /// The range of nearly all values, at least a share of `size` so that rounding noise of a
@@ -89,4 +177,19 @@ fn axis_range(values: &[f64], size: f64) -> [f64; 2] {
     }
     let half = (0.56 * (hi - lo)).max(0.05 * size).max(0.02 * hi.abs());
     [0.5 * (lo + hi) - half, 0.5 * (lo + hi) + half]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn curves_are_cut_at_the_border_and_stay_joined_inside() {
+        let window = [[0.0, 0.0], [1.0, 1.0]];
+        let through = clipped(&[[-1.0, 0.5], [0.25, 0.5], [0.5, 0.75], [0.5, 3.0]], window);
+        assert_eq!(through, [[[0.0, 0.5], [0.25, 0.5], [0.5, 0.75], [0.5, 1.0]]]);
+        let twice = clipped(&[[0.2, 0.5], [0.2, 2.0], [0.8, 2.0], [0.8, 0.5]], window);
+        assert_eq!(twice, [[[0.2, 0.5], [0.2, 1.0]], [[0.8, 1.0], [0.8, 0.5]]]);
+        assert!(clipped(&[[2.0, 2.0], [3.0, 2.0]], window).is_empty());
+    }
 }

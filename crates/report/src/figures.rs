@@ -35,8 +35,10 @@ impl Report {
         if let Some(history) = &self.energies {
             plot("energies.svg".to_owned(), energies_svg(history));
         }
-        for view in &self.stages {
-            if let Some(svg) = diagram_svg(view, &self.relations) {
+        for (index, view) in self.stages.iter().enumerate() {
+            // What came first lies behind all that follows.
+            let behind = self.stages.first().filter(|_| index > 0);
+            if let Some(svg) = diagram_svg(view, behind, &self.relations) {
                 plot(format!("{}-diagram.svg", file_word(view.name())), svg);
             }
         }

@@ -30,13 +30,14 @@ const SCRIPTS: [&str; 12] = [
 ];
 const MAIN: &str = include_str!("viewer/js/main.js");
 
-const SHADERS: [(&str, &str); 9] = [
+const SHADERS: [(&str, &str); 10] = [
     ("surface.vert", include_str!("viewer/glsl/surface.vert")),
     ("surface.frag", include_str!("viewer/glsl/surface.frag")),
     ("colour.glsl", include_str!("viewer/glsl/colour.glsl")),
     ("diagram.vert", include_str!("viewer/glsl/diagram.vert")),
     ("diagram.frag", include_str!("viewer/glsl/diagram.frag")),
     ("line.vert", include_str!("viewer/glsl/line.vert")),
+    ("thin.vert", include_str!("viewer/glsl/thin.vert")),
     ("line.frag", include_str!("viewer/glsl/line.frag")),
     ("pick.vert", include_str!("viewer/glsl/pick.vert")),
     ("pick.frag", include_str!("viewer/glsl/pick.frag")),
@@ -68,7 +69,11 @@ impl Report {
             page += &card("wide", title_or(&seams.title, "Worst seams"), &seam_rows(self, seams));
         }
         if !metrics.is_empty() {
-            page += &card("", "Metrics", &table(&flat_rows(&metrics)));
+            let (single, compared) = split_comparable(metrics);
+            if compared.len() > 1 {
+                page += &card("wide", "Compared", &comparison(&compared));
+            }
+            page += &card("", "Metrics", &table(&flat_rows(&single)));
         }
         if !self.options.is_empty() {
             page += &card("", "Options", &table(&self.options));
@@ -149,6 +154,47 @@ fn table(rows: &[(String, String)]) -> String {
         let _ = writeln!(text, "<tr><th scope=\"row\">{name}</th><td>{value}</td></tr>");
     }
     text + "</tbody></table>"
+}
+
+/// Takes out nested metrics that have the same keys, if there are several.
+fn split_comparable(metrics: Map<String, Value>) -> (Map<String, Value>, Vec<(String, Value)>) {
+    let keys = |value: &Value| -> Option<Vec<String>> {
+        value.as_object().map(|object| object.keys().cloned().collect())
+    };
+    let first = metrics.values().find_map(keys);
+    let is_like = |value: &Value| first.is_some() && keys(value) == first;
+    if metrics.values().filter(|value| is_like(value)).count() < 2 {
+        return (metrics, Vec::new());
+    }
+    let (mut single, mut compared) = (Map::new(), Vec::new());
+    for (name, value) in metrics {
+        if is_like(&value) {
+            compared.push((name, value));
+        } else {
+            single.insert(name, value);
+        }
+    }
+    (single, compared)
+}
+
+/// Objects of the same keys side by side.
+fn comparison(objects: &[(String, Value)]) -> String {
+    let rows = objects.iter().map(|(_, v)| v.as_object().map(flat_rows).unwrap_or_default());
+    let columns: Vec<Vec<(String, String)>> = rows.collect();
+    let mut text = String::from("<div class=\"scroll\"><table>\n<thead><tr><th></th>");
+    for (name, _) in objects {
+        let _ = write!(text, "<th class=\"number\">{}</th>", escape(name));
+    }
+    text += "</tr></thead>\n<tbody>\n";
+    for (i, (name, _)) in columns[0].iter().enumerate() {
+        let _ = write!(text, "<tr><th scope=\"row\">{}</th>", escape(name));
+        for column in &columns {
+            let value = column.get(i).map_or("", |(_, value)| value);
+            let _ = write!(text, "<td>{}</td>", escape(value));
+        }
+        text += "</tr>\n";
+    }
+    text + "</tbody></table></div>"
 }
 
 /// Nested metrics as rows named by their dotted path.

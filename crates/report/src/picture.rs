@@ -135,14 +135,24 @@ impl Camera {
 /// Colours of the values of a field.
 struct Palette {
     table: Vec<[u8; 3]>,
+    /// The part of the table that is used: of a signed map a half, if all values have one sign.
+    part: [f64; 2],
     range: [f64; 2],
 }
 
 impl Palette {
     fn of(layer: Layer<'_>) -> Self {
         match layer {
-            Layer::Field(f) => Self { table: colormap::table(f.scale), range: field_range(f) },
-            Layer::Groups(_) => Self { table: Vec::new(), range: [0.0, 1.0] },
+            Layer::Field(f) => {
+                let range = field_range(f);
+                let part = match f.scale {
+                    FieldScale::Signed if range[0] >= 0.0 => [0.54, 1.0],
+                    FieldScale::Signed if range[1] <= 0.0 => [0.0, 0.46],
+                    _ => [0.0, 1.0],
+                };
+                Self { table: colormap::table(f.scale), part, range }
+            }
+            Layer::Groups(_) => Self { table: Vec::new(), part: [0.0, 1.0], range: [0.0, 1.0] },
         }
     }
 
@@ -151,12 +161,13 @@ impl Palette {
             return NO_VALUE;
         }
         let t = (value - self.range[0]) / (self.range[1] - self.range[0]);
-        self.table[(t.clamp(0.0, 1.0) * (TABLE - 1) as f64).round() as usize]
+        let t = self.part[0] + (self.part[1] - self.part[0]) * t.clamp(0.0, 1.0);
+        self.table[(t * (TABLE - 1) as f64).round() as usize]
     }
 }
 
 /// Values at the ends of the map: the field's own range, or its central 98 %, symmetric about 0
-/// where the sign matters.
+/// where both signs occur.
 fn field_range(field: &ScalarField) -> [f64; 2] {
     if let Some(range) = field.range {
         return range;
@@ -165,6 +176,8 @@ fn field_range(field: &ScalarField) -> [f64; 2] {
     let (lo, hi) = (quantile(&sorted, 0.01), quantile(&sorted, 0.99));
     let most = lo.abs().max(hi.abs());
     match field.scale {
+        // Values of one sign that differ enough get one half of the map for themselves.
+        FieldScale::Signed if lo * hi > 0.0 && hi - lo > 0.15 * most => [lo, hi],
         FieldScale::Signed if most > 0.0 => [-most, most],
         FieldScale::Magnitude if hi > lo => [if lo >= 0.0 && lo < 0.4 * hi { 0.0 } else { lo }, hi],
         FieldScale::Magnitude if most > 0.0 => [lo, lo + most],

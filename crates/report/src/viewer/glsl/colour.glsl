@@ -1,5 +1,6 @@
 uniform sampler2D uMap;     // row 0: signed, row 1: magnitude
 uniform float uMapRow;
+uniform vec2 uMapPart;      // the part of the row that is used
 uniform vec2 uRange;
 uniform vec3 uNoValue;
 uniform int uBrush;         // 0 none, 1 box in the diagram, 2 chosen vertices, 3 chosen group
@@ -10,6 +11,7 @@ bool hasValue(float v) { return abs(v) < 1e30; }
 vec3 mapped(float v) {
   if (!hasValue(v)) return uNoValue;
   float t = clamp((v - uRange.x) / (uRange.y - uRange.x), 0.0, 1.0);
+  t = mix(uMapPart.x, uMapPart.y, t);
   return texture(uMap, vec2((t * 255.0 + 0.5) / 256.0, uMapRow)).rgb;
 }
 

@@ -15,7 +15,7 @@ void main() {
   vec3 base = uMode == 0 ? mapped(vValue) : uMode == 1 ? vGroup.rgb : vec3(0.25, 0.36, 0.52);
   // Points near zero would vanish on white.
   base *= 0.88;
-  if (uPart == 1) base = vec3(0.87, 0.865, 0.85);
-  if (uPart == 3) base = vec3(0.70, 0.71, 0.73);
+  if (uPart == 1) base = vec3(0.62, 0.63, 0.66);
+  if (uPart == 3) base = uBrush == 0 ? vec3(0.70, 0.71, 0.73) : vec3(0.90, 0.895, 0.88);
   colour = vec4(base * uAlpha, uAlpha);
 }

@@ -36,6 +36,11 @@ function makeControls(app) {
   const compare = [["", "nothing"], ...stages.map((s, i) => [String(i), s.name])];
   options(byId("compare"), compare, (value) => app.change(value === "" ? { compare: false } : { compare: true, other: Number(value) }));
   byId("compare").parentElement.hidden = stages.length < 2;
+  const behind = [["-1", "nothing"], ...stages.map((s, i) => [String(i), s.name])];
+  options(byId("behind"), behind, (value) => {
+    app.diagram.zoom = null;
+    app.change({ behind: Number(value) });
+  });
   const none = [["", "none"], ...fields.map((f) => [f.id, f.label])];
   ["iso-first", "iso-second"].forEach((id, k) => {
     options(byId(id), none, (value) => {
@@ -65,7 +70,12 @@ function makeControls(app) {
       else chosen.delete(l.id);
       app.change({ lines: chosen });
     });
-    lineChecks.push({ label: element("label", {}, input, l.label), sync: () => { input.checked = app.state.lines.has(l.id); } });
+    const label = element("label", {}, input, l.label);
+    const sync = () => {
+      input.checked = app.state.lines.has(l.id);
+      label.hidden = !app.shown().some((i) => stages[i].lines.some((own) => own.id === l.id));
+    };
+    lineChecks.push({ label, sync });
   }
   byId("lines").append(...lineChecks.map((c) => c.label));
 
@@ -82,7 +92,8 @@ function makeControls(app) {
   byId("range-all").hidden = stages.length < 2;
   const syncRange = () => {
     const values = app.state.range ?? look.autoRange(app.state.field, app.shown());
-    range.forEach((input, i) => { input.value = String(Number(values[i].toPrecision(4))); });
+    const short = (x) => (x !== 0 && Math.abs(x) < 1e-3 ? Number(x.toPrecision(4)).toExponential() : String(Number(x.toPrecision(4))));
+    range.forEach((input, i) => { input.value = short(values[i]); });
   };
 
   for (const key of ["stripes", "angle"]) {
@@ -106,14 +117,26 @@ function makeControls(app) {
     if (event.key === "Escape") app.clearBrush();
   });
 
+  // What no stage in view has cannot be chosen.
+  const offer = (select, kind) => {
+    const known = new Set(app.shown().flatMap((i) => stages[i][kind].map((x) => x.id)));
+    for (const option of select.options) option.disabled = option.value !== "" && !known.has(option.value);
+  };
+
   return () => {
     const s = app.state;
     syncStages();
     syncModes();
+    offer(byId("field"), "fields");
+    offer(byId("group"), "groups");
+    offer(byId("iso-first"), "fields");
+    offer(byId("iso-second"), "fields");
     byId("field").value = s.field;
     byId("group").value = s.group;
     byId("field").parentElement.hidden = fields.length === 0 || s.mode !== "field";
     byId("group").parentElement.hidden = s.mode !== "groups";
+    byId("behind").value = String(s.behind);
+    byId("behind-box").hidden = stages.length < 2 || s.compare;
     byId("compare").value = s.compare ? String(s.other) : "";
     byId("iso-first").value = s.iso[0];
     byId("iso-second").value = s.iso[1];

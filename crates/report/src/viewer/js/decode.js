@@ -33,7 +33,9 @@ const decodeIntegers = (bytes, packed) => new Uint32Array(decodeCodes(bytes, pac
 function decodeFloats(bytes, packed) {
   const codes = decodeCodes(bytes, packed.layout);
   const step = packed.span / (packed.levels - 1);
-  return Float64Array.from(codes, (q) => (q === packed.levels ? NaN : packed.lo + q * step));
+  const values = new Float64Array(codes.length);
+  for (let i = 0; i < codes.length; i++) values[i] = codes[i] === packed.levels ? NaN : packed.lo + codes[i] * step;
+  return values;
 }
 
 function decodePoints(bytes, packed, origin) {
@@ -56,8 +58,10 @@ function decodeNormals(bytes, packed) {
     const t = Math.max(-z, 0);
     const nx = x[i] - (x[i] < 0 ? -t : t);
     const ny = y[i] - (y[i] < 0 ? -t : t);
-    const length = Math.hypot(nx, ny, z);
-    normals.set([nx / length, ny / length, z / length], 3 * i);
+    const length = Math.sqrt(nx * nx + ny * ny + z * z);
+    normals[3 * i] = nx / length;
+    normals[3 * i + 1] = ny / length;
+    normals[3 * i + 2] = z / length;
   }
   return normals;
 }

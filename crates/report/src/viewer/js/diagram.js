@@ -5,8 +5,9 @@ const MARGIN = { left: 54, right: 10, top: 10, bottom: 38 };
 function makeDiagram(node, app) {
   const svg = node.querySelector("svg");
   const diagram = { zoom: null, marker: null };
+  const ring = element("circle", { r: 6, class: "marker" });
 
-  diagram.window = () => diagram.zoom ?? app.look.diagramWindow(app.shown(), app.state.axes);
+  diagram.window = () => diagram.zoom ?? app.look.diagramWindow(app.inDiagram(), app.state.axes);
   // The plot inside the margins, in CSS pixels of the node.
   diagram.plot = () => ({
     x: MARGIN.left, y: MARGIN.top,
@@ -54,21 +55,39 @@ function makeDiagram(node, app) {
     const inside = element("g", { "clip-path": "url(#plot-clip)" });
     inside.append(umbilicCurve(w, app.state.axes, toPixels));
     for (const relation of app.data.relations) {
-      const places = relation.points.map(([h, k]) => toPixels(axes.at(h, k)).map((c) => c.toFixed(1)).join(" "));
-      inside.append(element("path", { d: `M${places.join("L")}`, class: "relation" }));
-      const [x, y] = toPixels(axes.at(...relation.points[Math.floor(relation.points.length / 2)]));
-      inside.append(element("text", { x: x + 6, y: y - 6, class: "relation-name" }, relation.name));
+      inside.append(element("path", { d: pathOf(relation.points, app.state.axes, toPixels), class: "relation" }));
     }
     if (app.state.brush) {
       const [x0, y1] = toPixels(app.state.brush.slice(0, 2));
       const [x1, y0] = toPixels(app.state.brush.slice(2));
       inside.append(element("rect", { x: x0, y: y0, width: Math.max(x1 - x0, 1), height: Math.max(y1 - y0, 1), class: "brush" }));
     }
-    if (diagram.marker) {
-      const [x, y] = toPixels(diagram.marker);
-      inside.append(element("circle", { cx: x, cy: y, r: 6, class: "marker" }));
-    }
+    inside.append(ring);
     svg.replaceChildren(element("defs", {}, clip), ...parts, inside);
+    diagram.mark(diagram.marker);
+  };
+
+  // A ring around the place of the point under the pointer, or none.
+  diagram.mark = (place) => {
+    diagram.marker = place;
+    const there = place !== null && place.every(Number.isFinite);
+    ring.style.display = there ? "" : "none";
+    if (!there) return;
+    const [x, y] = toPixels(place);
+    ring.setAttribute("cx", x);
+    ring.setAttribute("cy", y);
+  };
+
+  // What the dots and curves are.
+  diagram.drawKey = () => {
+    const { stages, state, data } = app;
+    const entry = (cls, text) => element("span", {}, element("i", { class: cls }), text);
+    const parts = [entry("dot", stages[state.stage].name)];
+    const behind = app.behind();
+    if (behind >= 0) parts.push(entry("dot grey", stages[behind].name));
+    for (const relation of data.relations) parts.push(entry("curve", relation.name));
+    parts.push(entry("dashes", state.axes === "k1k2" ? "κ₁ = κ₂" : "K = H²"));
+    byId("diagram-key").replaceChildren(...parts);
   };
 
   let start = null;
@@ -142,7 +161,23 @@ function umbilicCurve(w, axesName, toPixels) {
   const points = [];
   for (let i = 0; i <= 80; i++) {
     const h = w[0] + ((w[2] - w[0]) * i) / 80;
-    points.push(toPixels(AXES[axesName].at(h, h * h)).map((c) => clamp(c, -1e4, 1e4).toFixed(1)).join(" "));
+    points.push([h, h * h]);
   }
-  return element("path", { d: `M${points.join("L")}`, class: "umbilic" });
+  return element("path", { d: pathOf(points, axesName, toPixels), class: "umbilic" });
+}
+
+// A path through points (H, K); it is broken where a point has no place on the axes.
+function pathOf(points, axesName, toPixels) {
+  let d = "";
+  let pen = "M";
+  for (const [h, k] of points) {
+    const place = toPixels(AXES[axesName].at(h, k));
+    if (place.every((c) => Math.abs(c) < 1e7)) {
+      d += `${pen}${place[0].toFixed(1)} ${place[1].toFixed(1)}`;
+      pen = "L";
+    } else {
+      pen = "M";
+    }
+  }
+  return d;
 }

@@ -44,6 +44,7 @@ function makePrograms(gl) {
     surface: makeProgram(gl, "surface", ["surface.vert"], ["colour.glsl", "surface.frag"]),
     diagram: makeProgram(gl, "diagram", ["diagram.vert"], ["colour.glsl", "diagram.frag"]),
     line: makeProgram(gl, "line", ["line.vert"], ["line.frag"]),
+    thin: makeProgram(gl, "thin", ["thin.vert"], ["line.frag"]),
     pick: makeProgram(gl, "pick", ["pick.vert"], ["pick.frag"]),
   };
 }
@@ -84,27 +85,42 @@ function uploadStage(gl, stage) {
   attribute("diagram", 4, 2);
   attribute("selected", 5, 1, gl.UNSIGNED_BYTE, true);
   attribute("group", 6, 4, gl.UNSIGNED_BYTE, true);
-  gl.bindBuffer(gl.ELEMENT_ARRAY_BUFFER, gl.createBuffer());
-  gl.bufferData(gl.ELEMENT_ARRAY_BUFFER, stage.triangles, gl.STATIC_DRAW);
   gl.bindVertexArray(null);
-  const lines = [["wire", stage.wire], ["outline", stage.outline], ["borders", stage.groupBorders]];
-  for (const l of stage.lines) lines.push([`set:${l.id}`, l.segments]);
-  for (const [name, segments] of lines) gpu.lines.set(name, uploadSegments(gl, segments));
+  gpu.fine = uploadTriangles(gl, stage.triangles);
   return gpu;
 }
 
+// Triangles as indices; drawn with the vertices that are bound.
+function uploadTriangles(gl, corners) {
+  const buffer = gl.createBuffer();
+  gl.bindVertexArray(null);
+  gl.bindBuffer(gl.ELEMENT_ARRAY_BUFFER, buffer);
+  gl.bufferData(gl.ELEMENT_ARRAY_BUFFER, corners, gl.STATIC_DRAW);
+  return {
+    draw: (kind = gl.TRIANGLES) => {
+      gl.bindBuffer(gl.ELEMENT_ARRAY_BUFFER, buffer);
+      gl.drawElements(kind, corners.length, gl.UNSIGNED_INT, 0);
+    },
+  };
+}
+
+// More segments than this are drawn one pixel wide, which costs a fraction of wide ones.
+const WIDE_SEGMENTS = 12000;
+
 function uploadSegments(gl, segments) {
   const vao = gl.createVertexArray();
+  const count = segments.length / 6;
+  const thin = count > WIDE_SEGMENTS;
   gl.bindVertexArray(vao);
   gl.bindBuffer(gl.ARRAY_BUFFER, gl.createBuffer());
   gl.bufferData(gl.ARRAY_BUFFER, segments, gl.STATIC_DRAW);
-  for (const [place, offset] of [[0, 0], [1, 12]]) {
+  for (const [place, offset] of thin ? [[0, 0]] : [[0, 0], [1, 12]]) {
     gl.enableVertexAttribArray(place);
-    gl.vertexAttribPointer(place, 3, gl.FLOAT, false, 24, offset);
-    gl.vertexAttribDivisor(place, 1);
+    gl.vertexAttribPointer(place, 3, gl.FLOAT, false, thin ? 12 : 24, offset);
+    gl.vertexAttribDivisor(place, thin ? 0 : 1);
   }
   gl.bindVertexArray(null);
-  return { vao, count: segments.length / 6 };
+  return { vao, count, thin };
 }
 
 function fillAttribute(gl, gpu, name, data) {

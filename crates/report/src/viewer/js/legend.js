@@ -49,7 +49,8 @@ function colourBar(app, field, map) {
   const range = state.range ?? look.autoRange(field.id, app.shown());
   const height = 190;
   const bar = element("div", { class: "bar-row", style: `height:${height}px` });
-  const stops = Array.from({ length: 17 }, (_, i) => map[Math.round((i / 16) * 255)]);
+  const [first, last] = mapPart(field, range);
+  const stops = Array.from({ length: 17 }, (_, i) => map[Math.round((first + (last - first) * (i / 16)) * 255)]);
   bar.append(element("div", { class: "ramp", style: `background:linear-gradient(to top, ${stops.join(",")})` }));
   // How the area is spread over the values.
   const density = look.density(state.stage, field.id, range, 48);

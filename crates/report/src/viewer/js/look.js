@@ -24,6 +24,8 @@ function makeLook(stages, lengthUnit) {
       const [lo, hi] = full ? [values[0], values[values.length - 1]] : [quantile(values, 0.01), quantile(values, 0.99)];
       if (field.signed) {
         const most = Math.max(Math.abs(lo), Math.abs(hi), noise(id));
+        // Values of one sign that differ enough get one half of the map for themselves.
+        if (lo * hi > 0 && hi - lo > 0.15 * most) return [lo, hi];
         return most > 0 ? [-most, most] : [-1, 1];
       }
       const start = values[0] >= 0 && lo < 0.4 * hi ? 0 : lo;
@@ -89,6 +91,12 @@ function makeLook(stages, lengthUnit) {
   }
 
   return { autoRange, isoStep, density, extremes, diagramWindow, everywhere, sorted, diagonal, lengthUnit };
+}
+
+// The part of the colour map a range uses: signs keep their colours.
+function mapPart(field, [lo, hi]) {
+  if (!field?.signed || (lo < 0 && hi > 0)) return [0, 1];
+  return lo >= 0 ? [0.54, 1] : [0, 0.46];
 }
 
 function boxDiagonal(positions) {

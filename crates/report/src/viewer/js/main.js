@@ -33,10 +33,15 @@ function makeApp(data, stages, origin, gl, canvas) {
   };
   app.diagram = makeDiagram(byId("diagram"), app);
   const syncControls = makeControls(app);
-  let asked = false;
   let ratio = 1;
   let saving = 0;
-  const hovered = { stage: -1, vertex: -1 };
+  const hovered = { stage: -1, vertex: -1, at: null };
+  // What has to be drawn next: "", "camera" (the surface alone) or "all".
+  let wanted = "";
+  // What the canvas shows; another layout needs a fresh canvas, other dots a fresh diagram.
+  const drawn = { layout: "", diagram: "" };
+  // While the camera moves a slow machine gets a coarse mesh: how long the last whole frame took.
+  const motion = { moving: false, timer: 0, milliseconds: 0, frames: 0, quick: false };
 
   app.begin = () => {
     resize();
@@ -62,12 +67,15 @@ function makeApp(data, stages, origin, gl, canvas) {
     document.title = `${data.title} – Umbilic`;
   };
 
-  app.refresh = () => {
+  app.refresh = (what = "all") => {
+    const asked = wanted !== "";
+    if (wanted !== "all") wanted = what;
     if (asked) return;
-    asked = true;
     requestAnimationFrame(() => {
-      asked = false;
-      draw();
+      const all = wanted === "all";
+      wanted = "";
+      if (all) draw();
+      else drawSurface();
     });
     clearTimeout(saving);
     saving = setTimeout(save, 400);
@@ -87,6 +95,7 @@ function makeApp(data, stages, origin, gl, canvas) {
     ratio = Math.min(window.devicePixelRatio || 1, 2);
     canvas.width = Math.round(box.clientWidth * ratio);
     canvas.height = Math.round(box.clientHeight * ratio);
+    drawn.layout = "";
   }
 
   // A node's place on the canvas, in device pixels from the lower left.
@@ -109,6 +118,13 @@ function makeApp(data, stages, origin, gl, canvas) {
     return [{ stage: other, x: 0, y: 0, width: half - 1, height }, { stage, x: half + 1, y: 0, width: width - half - 1, height }];
   };
   app.shown = () => (app.state.compare ? [app.state.stage, app.state.other] : [app.state.stage]);
+  // The stage whose points lie in grey behind those of the stage in view, or -1.
+  app.behind = () => {
+    const { stage, compare, other, behind } = app.state;
+    const found = compare ? other : behind;
+    return found >= 0 && found !== stage && diagramPoints(stages[found], app.state.axes) ? found : -1;
+  };
+  app.inDiagram = () => [app.state.stage, app.behind()].filter((i) => i >= 0);
   app.viewportAt = (x) => panes().find((p) => x < p.x + p.width) ?? panes().at(-1);
   app.viewportOf = (stage) => onCanvas(view, panes().findLast((p) => p.stage === stage));
 
@@ -120,29 +136,87 @@ function makeApp(data, stages, origin, gl, canvas) {
     } else {
       s.selection = null;
     }
-    const look = {
-      range: s.range ?? app.look.autoRange(s.field, app.shown()),
-      isoSteps: s.iso.map((id) => app.look.isoStep(id, app.shown())),
-    };
-    gl.viewport(0, 0, canvas.width, canvas.height);
-    gl.scissor(0, 0, canvas.width, canvas.height);
-    gl.clearColor(1, 1, 1, 1);
-    gl.clear(gl.COLOR_BUFFER_BIT);
-    for (const pane of panes()) app.scene.drawStage(pane.stage, s, look, onCanvas(view, pane), ratio);
     const curved = diagramPoints(stages[s.stage], s.axes) !== null;
     byId("diagram-box").hidden = !curved;
+    syncControls(); // may change the size of the diagram
+    if (curved) app.diagram.drawKey();
+    const place = curved && onCanvas(byId("diagram"), app.diagram.plot());
+    const layout = JSON.stringify([canvas.width, canvas.height, s.compare, place]);
+    if (drawn.layout !== layout) {
+      Object.assign(drawn, { layout, diagram: "" });
+      gl.viewport(0, 0, canvas.width, canvas.height);
+      gl.scissor(0, 0, canvas.width, canvas.height);
+      gl.clearColor(1, 1, 1, 1);
+      gl.clear(gl.COLOR_BUFFER_BIT);
+    }
+    drawSurface();
     if (curved) {
-      app.scene.drawDiagram(s, look, onCanvas(byId("diagram"), app.diagram.plot()), app.diagram.window(), ratio);
+      const { range } = lookNow();
+      const key = JSON.stringify([
+        s.stage, app.behind(), s.axes, s.mode, s.field, range, s.group, s.chosenGroup, s.brush,
+        s.selection && [s.selection.key, s.selection.stage], app.diagram.window(),
+      ]);
+      if (drawn.diagram !== key) {
+        drawn.diagram = key;
+        const hurry = inHurry();
+        const quick = app.scene.drawDiagram(s, lookNow(), place, app.diagram.window(), ratio, app.behind(), hurry);
+        motion.quick = quick || motion.quick;
+        if (quick) drawn.diagram = "";
+      }
       app.diagram.draw();
     }
     drawLegend(byId("legend"), app);
-    drawRuler(byId("ruler"), app, view.clientHeight);
     drawCaptions();
-    syncControls();
     const brushing = s.brush || s.selection || s.chosenGroup >= 0;
     const share = brushing ? `${formatNumber(100 * brushedShare(app))} % of the area is chosen.` : "";
     byId("brush-note").textContent = share || "Drag a box here, or select on the surface, to see where it belongs.";
     byId("clear-brush").hidden = !brushing;
+  }
+
+  const lookNow = () => ({
+    range: app.state.range ?? app.look.autoRange(app.state.field, app.shown()),
+    isoSteps: app.state.iso.map((id) => app.look.isoStep(id, app.shown())),
+  });
+
+  const inHurry = () => motion.moving && motion.milliseconds > 50;
+
+  // Something follows the pointer: what is drawn coarsely meanwhile is drawn finely when it rests.
+  function keepMoving() {
+    motion.moving = true;
+    clearTimeout(motion.timer);
+    motion.timer = setTimeout(() => {
+      motion.moving = false;
+      if (motion.quick) app.refresh();
+    }, clamp(motion.milliseconds, 160, 700));
+  }
+
+  function drawSurface() {
+    const hurry = inHurry();
+    const look = lookNow();
+    motion.quick = false;
+    for (const pane of panes()) {
+      motion.quick = app.scene.drawStage(pane.stage, app.state, look, onCanvas(view, pane), ratio, hurry) || motion.quick;
+    }
+    drawRuler(byId("ruler"), app, view.clientHeight);
+    // The first frames compile and upload; they say nothing about the next.
+    motion.frames += 1;
+    if (motion.moving && !motion.quick && motion.frames > 2) timeFrame();
+  }
+
+  function timeFrame() {
+    if (motion.fence) return;
+    const start = performance.now();
+    motion.fence = gl.fenceSync(gl.SYNC_GPU_COMMANDS_COMPLETE, 0);
+    gl.flush();
+    const poll = () => {
+      if (gl.getSyncParameter(motion.fence, gl.SYNC_STATUS) !== gl.SIGNALED) {
+        setTimeout(poll, 4);
+        return;
+      }
+      gl.deleteSync(motion.fence);
+      Object.assign(motion, { fence: null, milliseconds: performance.now() - start });
+    };
+    setTimeout(poll, 0);
   }
 
   function drawCaptions() {
@@ -162,8 +236,10 @@ function makeApp(data, stages, origin, gl, canvas) {
   };
   app.nextStage = () => app.change({ stage: (app.state.stage + 1) % stages.length });
   app.cameraMoved = () => {
+    const named = app.state.view !== "";
     app.state.view = "";
-    app.refresh();
+    keepMoving();
+    app.refresh(named ? "all" : "camera");
   };
   app.setView = (name, quiet = false) => {
     const [azimuth, elevation] = VIEWS[name].map((d) => (d * Math.PI) / 180);
@@ -186,7 +262,10 @@ function makeApp(data, stages, origin, gl, canvas) {
     Object.assign(app.state, { camera, view: name, seam: quiet ? app.state.seam : -1 });
     app.refresh();
   };
-  app.setBrush = (brush) => app.change({ brush, pick: null, selection: null, chosenGroup: -1 });
+  app.setBrush = (brush) => {
+    keepMoving();
+    app.change({ brush, pick: null, selection: null, chosenGroup: -1 });
+  };
   app.clearBrush = () => {
     app.showRubber(null);
     app.change({ brush: null, pick: null, selection: null, chosenGroup: -1, seam: -1 });
@@ -214,14 +293,20 @@ function makeApp(data, stages, origin, gl, canvas) {
     return { pane, vertex: vertexAt(app, pane.stage, viewport, (x - pane.x) * ratio, viewport.height - (y - pane.y) * ratio) };
   };
   app.hover = (x, y) => {
+    const waiting = hovered.at !== null;
+    hovered.at = [x, y];
+    if (!waiting) requestAnimationFrame(lookUnderPointer);
+  };
+  const lookUnderPointer = () => {
+    const [x, y] = hovered.at;
+    hovered.at = null;
     const found = x < 0 ? { vertex: -1 } : under(x, y);
     const stage = found.pane?.stage ?? -1;
     if (hovered.vertex === found.vertex && hovered.stage === stage) return;
     Object.assign(hovered, { vertex: found.vertex, stage });
     drawReadout(byId("readout"), app, stage, found.vertex);
     const points = found.vertex >= 0 && diagramPoints(stages[stage], app.state.axes);
-    app.diagram.marker = points ? [points[2 * found.vertex], points[2 * found.vertex + 1]] : null;
-    app.diagram.draw();
+    app.diagram.mark(points ? [points[2 * found.vertex], points[2 * found.vertex + 1]] : null);
   };
   app.click = (x, y) => {
     const { pane, vertex } = under(x, y);

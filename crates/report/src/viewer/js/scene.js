@@ -24,6 +24,7 @@ function makeScene(gl, data, stages) {
   const pickTarget = makePickTarget(gl);
   const radius = Math.max(...stages.map((s) => boundingRadius(s.positions)));
   const filled = stages.map(() => ({}));
+  const slow = { limit: 30000, cells: 64 }; // triangles above which a coarse mesh is worth it
 
   const fieldOf = (stage, id) => stage.fields.find((f) => f.id === id);
   const missing = (count, size) => new Float32Array(count * size).fill(NO_VALUE);
@@ -61,10 +62,12 @@ function makeScene(gl, data, stages) {
     refill(i, "group", `${state.group}/${state.chosenGroup}`, () => {
       const group = stage.groups.find((g) => g.id === state.group);
       const out = new Uint8Array(4 * stage.count);
+      const none = noValue.map((c) => 255 * c);
       for (let v = 0; v < stage.count; v++) {
         const index = group ? group.ofVertex[v] : -1;
-        const colour = group ? groupColours[index] : noValue.map((c) => 255 * c);
-        out.set([...colour, index === state.chosenGroup ? 255 : 0], 4 * v);
+        const colour = group ? groupColours[index] : none;
+        for (let k = 0; k < 3; k++) out[4 * v + k] = colour[k];
+        out[4 * v + 3] = index === state.chosenGroup ? 255 : 0;
       }
       return out;
     });
@@ -73,24 +76,41 @@ function makeScene(gl, data, stages) {
   function common(state, look, field) {
     const brush = state.brush ? 1 : state.selection ? 2 : state.chosenGroup >= 0 ? 3 : 0;
     return {
-      uMap: 0, uMapRow: field && !field.signed ? 0.75 : 0.25, uRange: look.range, uNoValue: noValue,
+      uMap: 0, uMapRow: field && !field.signed ? 0.75 : 0.25, uMapPart: mapPart(field, look.range),
+      uRange: look.range, uNoValue: noValue,
       uBrush: brush, uBox: state.brush ?? [0, 0, 0, 0], uMode: MODES[state.mode],
     };
   }
 
-  function drawLines(lines, matrix, viewport, style, ratio) {
-    if (!lines || lines.count === 0) return;
-    gl.useProgram(programs.line.program);
-    programs.line.set({
+  function linesOf(i, name) {
+    const { lines } = gpu[i];
+    if (!lines.has(name) && stages[i].segments[name]) lines.set(name, uploadSegments(gl, stages[i].segments[name]()));
+    return lines.get(name);
+  }
+
+  function trianglesOf(i, quick) {
+    if (!quick) return gpu[i].fine;
+    gpu[i].coarse ??= uploadTriangles(gl, coarseTriangles(stages[i], slow.cells));
+    return gpu[i].coarse;
+  }
+
+  function drawLines(lines, matrix, viewport, style, ratio, quick) {
+    if (!lines || lines.count === 0 || (quick && lines.thin)) return;
+    const program = lines.thin ? programs.thin : programs.line;
+    gl.useProgram(program.program);
+    program.set({
       uViewProjection: matrix, uViewport: [viewport.width, viewport.height],
       uColour: style.colour, uWidth: style.width * ratio, uBias: style.bias,
     });
     gl.bindVertexArray(lines.vao);
-    gl.drawArraysInstanced(gl.TRIANGLE_STRIP, 0, 4, lines.count);
+    if (lines.thin) gl.drawArrays(gl.LINES, 0, 2 * lines.count);
+    else gl.drawArraysInstanced(gl.TRIANGLE_STRIP, 0, 4, lines.count);
   }
 
-  // One stage into a viewport given in device pixels from the lower left.
-  function drawStage(i, state, look, viewport, ratio) {
+  // One stage into a viewport given in device pixels from the lower left. `hurry` asks for a coarse
+  // mesh if the stage has many triangles.
+  function drawStage(i, state, look, viewport, ratio, hurry) {
+    const quick = hurry && stages[i].triangles.length / 3 > slow.limit;
     update(i, state);
     const stage = stages[i];
     const matrix = viewProjection(state.camera, viewport.width / viewport.height, radius);
@@ -108,16 +128,17 @@ function makeScene(gl, data, stages) {
       uStripes: state.stripes, uAngle: (state.angle * Math.PI) / 180, uIsoStep: look.isoSteps,
     });
     gl.bindTexture(gl.TEXTURE_2D, texture);
+    const triangles = trianglesOf(i, quick);
     gl.bindVertexArray(gpu[i].vao);
-    gl.drawElements(gl.TRIANGLES, stage.triangles.length, gl.UNSIGNED_INT, 0);
+    triangles.draw();
     gl.enable(gl.BLEND);
     gl.blendFunc(gl.ONE, gl.ONE_MINUS_SRC_ALPHA);
     gl.depthMask(false);
-    const line = (name, style) => drawLines(gpu[i].lines.get(name), matrix, viewport, style, ratio);
+    const line = (name, style) => drawLines(linesOf(i, name), matrix, viewport, style, ratio, quick);
     if (state.wire) line("wire", WIRE);
     if (state.edges && state.mode === "groups") line("borders", BORDERS);
     // The borders of many panels would hide what is on them.
-    if (state.edges) line("outline", stage.outline.length > 12000 ? PANEL_EDGES : OUTLINE);
+    if (state.edges) line("outline", linesOf(i, "outline").count > 2000 ? PANEL_EDGES : OUTLINE);
     for (const l of stage.lines) if (state.lines.has(l.id)) line(`set:${l.id}`, LINE_STYLES[l.role]);
     const seam = data.seams?.[state.seam];
     if (seam && seam.stage === i) {
@@ -126,9 +147,13 @@ function makeScene(gl, data, stages) {
     }
     gl.depthMask(true);
     gl.bindVertexArray(null);
+    return quick;
   }
 
-  function drawDiagram(state, look, viewport, window_, ratio) {
+  // The stage's points over those of the stage `behind` in grey (-1 for none), and the triangles
+  // between them unless there are many and `hurry` is asked for; tells whether they were left out.
+  function drawDiagram(state, look, viewport, window_, ratio, behind, hurry) {
+    const quick = hurry && stages[state.stage].triangles.length / 3 > slow.limit;
     gl.viewport(viewport.x, viewport.y, viewport.width, viewport.height);
     gl.scissor(viewport.x, viewport.y, viewport.width, viewport.height);
     gl.clearColor(1, 1, 1, 1);
@@ -142,24 +167,27 @@ function makeScene(gl, data, stages) {
     const draw = (i, part, alpha, points) => {
       const stage = stages[i];
       update(i, state);
+      const few = quick && i === state.stage ? trianglesOf(i, true) : null;
       gl.bindVertexArray(gpu[i].vao);
       programs.diagram.set({
         ...common(state, look, fieldOf(stage, state.field)),
         uWindow: [window_[0], window_[1], ...size], uPart: part, uAlpha: alpha,
-        uPointSize: (stage.count > 60000 ? 1.6 : stage.count > 8000 ? 2.2 : 3.2) * ratio,
+        uPointSize: (stage.count > 60000 ? 1.6 : stage.count > 8000 ? 2.2 : 3.2) * (part === 2 ? 1.8 : 1) * ratio,
       });
-      if (points) gl.drawArrays(gl.POINTS, 0, stage.count);
-      else gl.drawElements(gl.TRIANGLES, stage.triangles.length, gl.UNSIGNED_INT, 0);
+      if (points && few) few.draw(gl.POINTS);
+      else if (points) gl.drawArrays(gl.POINTS, 0, stage.count);
+      else gpu[i].fine.draw();
     };
-    if (state.compare && state.other !== state.stage) draw(state.other, 3, 0.8, true);
+    if (behind >= 0) draw(behind, 3, 0.8, true);
     const brushing = state.brush || state.selection || state.chosenGroup >= 0;
-    draw(state.stage, brushing ? 1 : 0, 0.12, false);
+    if (!quick) draw(state.stage, brushing ? 1 : 0, 0.12, false);
     draw(state.stage, brushing ? 1 : 0, 0.9, true);
     if (brushing) {
-      draw(state.stage, 2, 0.25, false);
+      if (!quick) draw(state.stage, 2, 0.25, false);
       draw(state.stage, 2, 1, true);
     }
     gl.bindVertexArray(null);
+    return quick;
   }
 
   // Numbers of the vertices in a rectangle of the viewport (pixels from its lower left), 0 for none.
@@ -179,7 +207,7 @@ function makeScene(gl, data, stages) {
       gl.useProgram(programs.pick.program);
       programs.pick.set({ uViewProjection: viewProjection(state.camera, width / height, radius) });
       gl.bindVertexArray(gpu[i].vao);
-      gl.drawElements(gl.TRIANGLES, stages[i].triangles.length, gl.UNSIGNED_INT, 0);
+      gpu[i].fine.draw();
       gl.bindVertexArray(null);
     }
     const x = clamp(Math.floor(rectangle.x), 0, width - 1);
@@ -216,7 +244,9 @@ function diagramPoints(stage, axesName) {
     const given = (axes.fields ?? []).map((id) => stage.fields.find((f) => f.id === id)?.values);
     const exact = given.length === 2 && given.every(Boolean);
     for (let v = 0; v < stage.count; v++) {
-      points.set(exact ? [given[0][v], given[1][v]] : axes.at(h[v], k[v]), 2 * v);
+      const [x, y] = exact ? [given[0][v], given[1][v]] : axes.at(h[v], k[v]);
+      points[2 * v] = x;
+      points[2 * v + 1] = y;
     }
     stage.diagram[axesName] = points;
   }

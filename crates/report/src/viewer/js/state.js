@@ -12,8 +12,10 @@ const AXES = {
   HsK: { needs: ["H", "K"], names: ["H", "sign(K) √|K|"], at: (h, k) => [h, signedRoot(k)] },
   k1k2: {
     needs: ["H", "K"], names: ["κ₁", "κ₂"], fields: ["kappa1", "kappa2"],
+    // Beyond K = H² there are no principal curvatures; rounding may lead a little there.
     at: (h, k) => {
-      const root = Math.sqrt(Math.max(h * h - k, 0));
+      const square = h * h - k;
+      const root = square < -1e-6 * (h * h + Math.abs(k)) ? NaN : Math.sqrt(Math.max(square, 0));
       return [h + root, h - root];
     },
   },
@@ -26,7 +28,7 @@ function initialState(stages) {
   const groups = stages[last].groups.map((g) => g.id);
   const lines = new Set(stages.flatMap((s) => s.lines.filter((l) => l.visible).map((l) => l.id)));
   return {
-    stage: last, compare: false, other: last > 0 ? 0 : last,
+    stage: last, compare: false, other: last > 0 ? 0 : last, behind: 0,
     mode: field ? "field" : groups.length ? "groups" : "plain",
     field, group: groups[0] ?? "", range: null, iso: ["", ""], lines,
     edges: true, wire: false, axes: "HK", brush: null, pick: null, chosenGroup: -1,
@@ -55,6 +57,8 @@ function stateToFragment(state) {
   if (!state.edges) put("edges", 0);
   if (state.wire) put("wire", 1);
   put("axes", state.axes);
+  if (state.behind < 0) put("behind", "none");
+  else if (state.behind > 0) put("behind", state.behind);
   if (state.brush) put("brush", state.brush.map(round).join(","));
   if (state.pick) put("pick", state.pick.map(round).join(","));
   if (state.chosenGroup >= 0) put("chosen", state.chosenGroup);
@@ -103,6 +107,7 @@ function applyFragment(state, fragment, stages) {
         state.other = index(text) ?? state.other;
         state.compare = stages.length > 1;
         break;
+      case "behind": state.behind = text === "none" ? -1 : index(text) ?? state.behind; break;
       case "mode": if (text in MODES) state.mode = text; break;
       case "field": if (stages.some((s) => s.fields.some((f) => f.id === text))) state.field = text; break;
       case "group": if (stages.some((s) => s.groups.some((g) => g.id === text))) state.group = text; break;
