@@ -15,8 +15,9 @@ use crate::curve::BezierCurve;
 use crate::data::{AsymptoticNet, DATA_DEGREE};
 use crate::error::{AsymptoticError, AsymptoticWarning};
 use crate::inflection::InflectedCurve;
+use crate::normal_net::solve_by_normals;
 use crate::torsion_energy::TorsionCurve;
-use crate::vertex::{PLANE_TOL, VertexFrame, vertex_frames};
+use crate::vertex::{PLANE_TOL, VertexFrame, curve_families, vertex_frames};
 use geom_core::linalg::{AffineSpace, Cholesky, Matrix, affine_space, dot};
 
 /// A coefficient of a torsion equation this small, relative to the curve's size, is no coefficient.
@@ -64,7 +65,7 @@ impl TorsionHandle {
         if sign < 0.0 { Self::Between(-large, -small) } else { Self::Between(small, large) }
     }
 
-    fn bounds(self) -> [f64; 2] {
+    pub(crate) fn bounds(self) -> [f64; 2] {
         match self {
             Self::Free => [f64::NEG_INFINITY, f64::INFINITY],
             Self::Fixed(tau) => [tau, tau],
@@ -73,10 +74,26 @@ impl TorsionHandle {
     }
 }
 
+/// What the boundary curves are made from.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum CurveForm {
+    /// By curvatures, but by normals where tangents and curvatures are estimates (nets made from meshes
+    /// and polylines) and a curve between two vertices has an inflection, or nearly one.
+    #[default]
+    Auto,
+    /// Curves with exactly the tangents and curvatures of the data, in the least-energy way.
+    Curvatures,
+    /// Curves of degree seven made from polynomial normals of degree four by Lelieuvre's formula
+    /// `r′ = ± N × N′`, which inflections do not disturb; curvatures are met approximately.
+    Normals,
+}
+
 /// Settings of the boundary solve.
 #[derive(Clone, Debug, PartialEq)]
 pub struct BoundaryOptions {
-    /// Degree of the curves, 5 to 9.
+    /// What the curves are made from.
+    pub form: CurveForm,
+    /// Degree of the curves, 5 to 9; those made from normals have 7 all the same.
     pub degree: usize,
     /// What is minimised.
     pub energy: BoundaryEnergy,
@@ -86,7 +103,12 @@ pub struct BoundaryOptions {
 
 impl Default for BoundaryOptions {
     fn default() -> Self {
-        Self { degree: 5, energy: BoundaryEnergy::Strain, torsions: Vec::new() }
+        Self {
+            form: CurveForm::Auto,
+            degree: 5,
+            energy: BoundaryEnergy::Strain,
+            torsions: Vec::new(),
+        }
     }
 }
 
@@ -148,7 +170,18 @@ pub fn solve_boundary(
         let degree = options.degree;
         return Err(AsymptoticError::Degree { what: "boundary", degree, min, max });
     }
+    let by_normals = match options.form {
+        CurveForm::Normals => true,
+        CurveForm::Curvatures => false,
+        CurveForm::Auto => {
+            net.estimated && net.has_weak_curvature() && curve_families(net).is_some()
+        }
+    };
+    if by_normals {
+        return solve_by_normals(net, options);
+    }
     net.check()?;
+    net.check_curvatures()?;
     let mut net = net.clone();
     let frames = vertex_frames(&mut net, PLANE_TOL)?;
     let order = if options.energy == BoundaryEnergy::Jerk { 3 } else { 2 };

@@ -2,7 +2,7 @@
 
 use geom_core::DVec3;
 
-use crate::bernstein;
+use crate::bernstein::{self, derivative, eval};
 
 /// Samples per curve for turning, torsion signs and extremes.
 pub(crate) const CURVE_SAMPLES: usize = 401;
@@ -12,10 +12,14 @@ pub(crate) const CURVE_SAMPLES: usize = 401;
 /// Besides the control points it keeps their offsets from the first one. The torsion of a curve of
 /// length `h` divides third differences by `h³`, so the rounding of coordinates far from the origin
 /// would show; the offsets are rounded in units of the curve itself.
+///
+/// A curve made from the normals of a surface along it keeps them (`r′ = ± N × N′`, Lelieuvre):
+/// they tell its torsion even where its curvature is zero.
 #[derive(Clone, Debug, PartialEq)]
 pub struct BezierCurve {
     points: Vec<DVec3>,
     offsets: Vec<DVec3>,
+    normals: Option<Vec<DVec3>>,
 }
 
 /// Position and the first three derivatives with respect to the parameter.
@@ -72,7 +76,7 @@ impl BezierCurve {
     pub fn new(points: Vec<DVec3>) -> Self {
         assert!(points.len() >= 4, "a boundary curve is at least a cubic");
         let offsets = points.iter().map(|p| *p - points[0]).collect();
-        Self { points, offsets }
+        Self { points, offsets, normals: None }
     }
 
     /// The curve between two points with these offsets from the first.
@@ -82,7 +86,17 @@ impl BezierCurve {
         if let Some(last) = points.last_mut() {
             *last = end;
         }
-        Self { points, offsets }
+        Self { points, offsets, normals: None }
+    }
+
+    /// The same curve with the control points of its polynomial normal `N`, `r′ = ± N × N′`.
+    pub(crate) fn with_normals(self, normals: Vec<DVec3>) -> Self {
+        Self { normals: Some(normals), ..self }
+    }
+
+    /// Control points of the polynomial normal it was made from.
+    pub(crate) fn normals(&self) -> Option<&[DVec3]> {
+        self.normals.as_deref()
     }
 
     /// Polynomial degree.
@@ -111,13 +125,19 @@ impl BezierCurve {
     pub fn reversed(&self) -> Self {
         let last = self.offsets[self.degree()];
         let offsets = self.offsets.iter().rev().map(|d| *d - last).collect();
-        Self { points: self.points.iter().rev().copied().collect(), offsets }
+        let points = self.points.iter().rev().copied().collect();
+        let normals = self.normals.as_ref().map(|n| n.iter().rev().copied().collect());
+        Self { points, offsets, normals }
     }
 
     /// The same curve written in degree `degree`, which is not below its own.
     #[must_use]
     pub fn elevated(&self, degree: usize) -> Self {
-        Self::from_offsets(bernstein::elevate(&self.offsets, degree), self.ends())
+        let normals = self.normals.clone();
+        Self {
+            normals,
+            ..Self::from_offsets(bernstein::elevate(&self.offsets, degree), self.ends())
+        }
     }
 
     /// Position at `t`.
@@ -175,7 +195,7 @@ impl BezierCurve {
             let jet = table.at(t);
             let b = jet.first.cross(jet.second);
             let speed = jet.first.length();
-            let (k, tau) = (jet.curvature(), jet.torsion());
+            let (k, tau) = (jet.curvature(), table.torsion(t, &jet));
             // Trapezoidal rule, as the sampled extremes use the same points.
             let weight = if i == 0 || i + 1 == CURVE_SAMPLES { 0.5 * step } else { step };
             out.length += weight * speed;
@@ -183,8 +203,9 @@ impl BezierCurve {
             out.curvature = [out.curvature[0].min(k), out.curvature[1].max(k)];
             out.torsion = [out.torsion[0].min(tau), out.torsion[1].max(tau)];
             out.relative_speed = out.relative_speed.min(speed);
-            // A sample on the inflection itself has no binormal to compare.
-            if b == DVec3::ZERO {
+            // A sample on the inflection itself has no binormal to compare, and with a normal along
+            // the curve reversals do no harm.
+            if b == DVec3::ZERO || self.normals.is_some() {
                 continue;
             }
             if let Some((before, binormal)) = last
@@ -207,6 +228,7 @@ pub(crate) struct JetTable<'a> {
     first: Vec<DVec3>,
     second: Vec<DVec3>,
     third: Vec<DVec3>,
+    normals: Option<&'a [DVec3]>,
 }
 
 impl<'a> JetTable<'a> {
@@ -214,7 +236,16 @@ impl<'a> JetTable<'a> {
         let first = bernstein::derivative(&curve.offsets);
         let second = bernstein::derivative(&first);
         let third = bernstein::derivative(&second);
-        Self { start: curve.points[0], offsets: &curve.offsets, first, second, third }
+        let normals = curve.normals();
+        Self { start: curve.points[0], offsets: &curve.offsets, first, second, third, normals }
+    }
+
+    /// Torsion at `t`, where the curve has this jet: from the normals where there are any
+    /// (`|τ| = 1/|N|²`), which inflections and lines do not disturb.
+    pub(crate) fn torsion(&self, t: f64, jet: &CurveJet) -> f64 {
+        let Some(normals) = self.normals else { return jet.torsion() };
+        let (n, slope) = (eval(normals, t), eval(&derivative(normals), t));
+        n.length_squared().recip().copysign(n.cross(slope).dot(jet.first))
     }
 
     pub(crate) fn at(&self, t: f64) -> CurveJet {

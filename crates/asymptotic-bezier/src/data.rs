@@ -88,6 +88,7 @@ impl CornerData {
             curves,
             faces: vec![NetFace { curves: [0, 1, 2, 3], reversed: [false; 4] }],
             single: true,
+            estimated: false,
         }
     }
 
@@ -187,7 +188,12 @@ pub struct AsymptoticNet {
     pub(crate) faces: Vec<NetFace>,
     // Messages name curves and corners as the paper does when the net is one patch.
     pub(crate) single: bool,
+    // Whether tangents and curvatures were estimated from positions.
+    pub(crate) estimated: bool,
 }
+
+/// End curvatures are weak below this share of the larger one: quintics become wild there.
+const WEAK_CURVATURE: f64 = 0.1;
 
 impl AsymptoticNet {
     /// Vertex positions.
@@ -231,7 +237,15 @@ impl AsymptoticNet {
         if self.single { Place::PatchCorner(v) } else { Place::NetVertex(v) }
     }
 
-    /// Refuses NaN, coincident tangents, zero curvatures, crooked lines, wrong inflection parity.
+    /// Whether a curve has an inflection, or an end nearly without curvature.
+    pub(crate) fn has_weak_curvature(&self) -> bool {
+        self.curves.iter().filter(|c| !c.line).any(|c| {
+            let [a, b] = c.curvatures.map(f64::abs);
+            c.inflections > 0 || a.min(b) <= WEAK_CURVATURE * a.max(b)
+        })
+    }
+
+    /// Refuses NaN, coincident tangents and crooked lines.
     ///
     /// # Errors
     /// The first fault found, by curve.
@@ -277,14 +291,27 @@ impl AsymptoticNet {
                         curvature: curve.curvatures[e],
                     });
                 }
-            } else if curve.curvatures[e] == 0.0 {
-                return Err(AsymptoticError::ZeroCurvature { place, end: name[e] });
             }
         }
-        // At the end the arm runs against the curve, so equal sides have opposite signs.
-        let same_side = curve.curvatures[0] * curve.curvatures[1] < 0.0;
-        if !curve.line && same_side != curve.inflections.is_multiple_of(2) {
-            return Err(AsymptoticError::InflectionParity { place, declared: curve.inflections });
+        Ok(())
+    }
+
+    /// Refuses zero curvatures, and curvatures that contradict the declared inflections.
+    pub(crate) fn check_curvatures(&self) -> Result<(), AsymptoticError> {
+        for (i, curve) in self.curves.iter().enumerate().filter(|(_, c)| !c.line) {
+            let place = self.curve_place(i);
+            for e in 0..2 {
+                if curve.curvatures[e] == 0.0 {
+                    let end = ["start", "end"][e];
+                    return Err(AsymptoticError::ZeroCurvature { place, end });
+                }
+            }
+            // At the end the arm runs against the curve, so equal sides have opposite signs.
+            let same_side = curve.curvatures[0] * curve.curvatures[1] < 0.0;
+            if same_side != curve.inflections.is_multiple_of(2) {
+                let declared = curve.inflections;
+                return Err(AsymptoticError::InflectionParity { place, declared });
+            }
         }
         Ok(())
     }

@@ -120,6 +120,19 @@ pub enum AsymptoticError {
     /// The system of all patches together.
     #[error("the system of all patches cannot be solved ({0}); fill them with G1 joins")]
     Joint(#[source] gp_solver::SolverError),
+    /// Curves from normals on a net whose vertices do not alternate.
+    #[error(
+        "the curves do not fall into two families (an inner vertex of odd valence, or a net that cannot be coloured), so no normals with K < 0 run along them; make the curves from curvatures"
+    )]
+    NoFamilies,
+    /// Least squares for the curves of a net.
+    #[error("the curves of the net cannot be solved for ({0}); mend tangents and curvatures")]
+    Curves(#[source] gp_solver::SolverError),
+    /// A curve from normals that does not reach its end.
+    #[error(
+        "{place}: no curve from normals reaches its end (gap {gap:.3e} chords); mend the tangents at its vertices or refine the net"
+    )]
+    NotClosed { place: Place, gap: f64 },
     /// Degree outside what the construction offers.
     #[error("degree {degree} of the {what} is outside {min}..={max}")]
     Degree { what: &'static str, degree: usize, min: usize, max: usize },

@@ -5,13 +5,15 @@
 //! control polygon, without the last and without the first one, as coefficients: they are a
 //! basis of the syzygies of `r′ × r″ = p²(p−1) D₀ × D₁`. At an inflection the cross product has
 //! a zero that the fields need not share, so the basis is saturated: a combination that vanishes
-//! there is divided by `t − t₀`. Along a line every field will do.
+//! there is divided by `t − t₀`. Along a line every field will do. Along a curve made from the
+//! normals of the surface the fields are those orthogonal to them.
 //!
 //! The ansatz of Wang et al. 2019, Eq. 4.1, `x r′ + y (r′ × r″) × r′`, is kept for comparison.
 
 use geom_core::DVec3;
+use geom_core::linalg::{Matrix, affine_space};
 
-use crate::bernstein::{cross, derivative, divide_by_root, elevate, eval, times_basis};
+use crate::bernstein::{binomial, cross, derivative, divide_by_root, elevate, eval, times_basis};
 use crate::curve::BezierCurve;
 
 /// A linear space of fields along one curve.
@@ -24,8 +26,86 @@ pub(crate) struct FieldSpace {
     pub(crate) normal: Option<Vec<DVec3>>,
 }
 
+/// The tangent fields of degree `n` along a boundary curve, by what is known of its tangent planes.
+pub(crate) fn tangent_fields(
+    curve: &BezierCurve,
+    line: bool,
+    inflections: &[f64],
+    ribbon: Option<&[DVec3; 4]>,
+    n: usize,
+) -> FieldSpace {
+    match (curve.normals(), ribbon) {
+        (Some(normals), _) => normal_fields(normals, n),
+        (None, Some(ribbon)) if line => ribbon_fields(curve, ribbon, n),
+        (None, None) if line => line_fields(n),
+        _ => tangent_module(curve, inflections, n),
+    }
+}
+
+/// All fields `T` of degree `n` with `N · T = 0`, for a polynomial normal `N`: the null space of
+/// the products of their control points.
+///
+/// Tangents and twists at the corners read two control points at either end. The basis is chosen
+/// so that a field is zero at one end at least: first those that are zero at both, then those of
+/// the start, then those of the end.
+fn normal_fields(normals: &[DVec3], n: usize) -> FieldSpace {
+    let m = normals.len() - 1;
+    let unknowns = 3 * (n + 1);
+    let mut products = vec![vec![0.0; unknowns]; n + m + 1];
+    for k in 0..=n {
+        for (i, normal) in normals.iter().enumerate() {
+            let share = binomial(n, k) * binomial(m, i) / binomial(n + m, k + i);
+            for (axis, c) in normal.to_array().into_iter().enumerate() {
+                products[k + i][3 * k + axis] = share * c;
+            }
+        }
+    }
+    let zero_at = |points: [usize; 2]| {
+        points.into_iter().flat_map(|k| 3 * k..3 * k + 3).map(move |c| {
+            let mut row = vec![0.0; unknowns];
+            row[c] = 1.0;
+            row
+        })
+    };
+    let [start, end] = [[0, 1], [n - 1, n]];
+    // The fields orthogonal to all rows, as rows.
+    let orthogonal = |rows: Vec<Vec<f64>>| -> Vec<Vec<f64>> {
+        let mut matrix = Matrix::zeros(rows.len(), unknowns);
+        for (r, row) in rows.iter().enumerate() {
+            matrix.row_mut(r).copy_from_slice(row);
+        }
+        let none = vec![0.0; rows.len()];
+        let null = affine_space(&matrix, &none, &vec![1.0; unknowns], 1e-12).null;
+        (0..null.cols()).map(|f| (0..unknowns).map(|k| null[(k, f)]).collect()).collect()
+    };
+    let product_rows = || products.iter().cloned();
+    let inner = orthogonal(product_rows().chain(zero_at(start)).chain(zero_at(end)).collect());
+    let beside = |other| {
+        orthogonal(product_rows().chain(zero_at(other)).chain(inner.iter().cloned()).collect())
+    };
+    let (of_start, of_end) = (beside(end), beside(start));
+    let at_end = inner.len() + of_start.len();
+    let basis = [&inner[..], &of_start, &of_end].concat();
+    let fields = basis
+        .iter()
+        .enumerate()
+        .map(|(f, row)| {
+            let mut field: Vec<DVec3> = row.chunks_exact(3).map(DVec3::from_slice).collect();
+            // Zeros to the last bit: corners tell their fields by them.
+            if f < inner.len() || f >= at_end {
+                field[..2].fill(DVec3::ZERO);
+            }
+            if f < at_end {
+                field[n - 1..].fill(DVec3::ZERO);
+            }
+            field
+        })
+        .collect();
+    FieldSpace { fields, normal: Some(normals.to_vec()) }
+}
+
 /// All polynomial tangent fields of degree `n` along `curve`, whose inflections are given.
-pub(crate) fn tangent_module(curve: &BezierCurve, inflections: &[f64], n: usize) -> FieldSpace {
+fn tangent_module(curve: &BezierCurve, inflections: &[f64], n: usize) -> FieldSpace {
     let differences: Vec<DVec3> = curve.offsets().windows(2).map(|w| w[1] - w[0]).collect();
     let last = differences.len() - 1;
     let mut basis = [differences[..last].to_vec(), differences[1..].to_vec()];
@@ -72,7 +152,7 @@ fn saturate(basis: &mut [Vec<DVec3>; 2], t0: f64) {
 }
 
 /// Every field of degree `n`: along a line the tangent plane is free.
-pub(crate) fn line_fields(n: usize) -> FieldSpace {
+fn line_fields(n: usize) -> FieldSpace {
     let mut fields = Vec::with_capacity(3 * (n + 1));
     for k in 0..=n {
         for axis in [DVec3::X, DVec3::Y, DVec3::Z] {
@@ -85,7 +165,7 @@ pub(crate) fn line_fields(n: usize) -> FieldSpace {
 }
 
 /// The fields in the planes of a line and a direction field across it: `f e + g W`.
-pub(crate) fn ribbon_fields(curve: &BezierCurve, ribbon: &[DVec3; 4], n: usize) -> FieldSpace {
+fn ribbon_fields(curve: &BezierCurve, ribbon: &[DVec3; 4], n: usize) -> FieldSpace {
     let points = curve.offsets();
     let along = points[points.len() - 1] - points[0];
     let mut fields: Vec<Vec<DVec3>> = (0..=n).map(|j| times_basis(n, j, &[along])).collect();
@@ -160,6 +240,36 @@ mod tests {
         }
     }
 
+    /// `2n + 2 − m` fields of degree `n` are orthogonal to a normal of degree `m`.
+    #[test]
+    fn fields_along_a_normal_are_orthogonal_to_it_independent_and_zero_at_one_end() {
+        let normal = [
+            DVec3::new(0.1, 0.0, 1.0),
+            DVec3::new(0.3, -0.1, 1.1),
+            DVec3::new(0.4, 0.2, 0.9),
+            DVec3::new(0.8, 0.1, 1.2),
+            DVec3::new(1.0, 0.3, 1.0),
+        ];
+        for n in [7, 9] {
+            let space = normal_fields(&normal, n);
+            assert_eq!(space.fields.len(), 2 * n + 2 - 4);
+            for field in &space.fields {
+                for t in (0..=10).map(|k| f64::from(k) / 10.0) {
+                    assert!(eval(field, t).dot(eval(&normal, t)).abs() < 1e-14);
+                }
+                let zero = |k: usize| field[k] == DVec3::ZERO;
+                assert!(zero(0) && zero(1) || zero(n - 1) && zero(n));
+            }
+            let mut gram = Matrix::zeros(space.fields.len(), space.fields.len());
+            for (i, a) in space.fields.iter().enumerate() {
+                for (j, b) in space.fields.iter().enumerate() {
+                    gram[(i, j)] = a.iter().zip(b).map(|(a, b)| a.dot(*b)).sum();
+                }
+            }
+            assert!(geom_core::linalg::Cholesky::new(&gram, 1e-6).is_some());
+        }
+    }
+
     #[test]
     fn paper_fields_lie_in_the_osculating_planes_and_have_degree_eleven() {
         let space = paper_ansatz(&quintic(), true);
@@ -208,7 +318,6 @@ mod tests {
         let (y, z) = (integrate(0), integrate(1));
         let x = [0.0, 1.0, 0.0, 0.0, 0.0, 0.0];
         // Power basis to Bernstein: b_j = Σ_i C(j,i)/C(5,i) a_i.
-        use crate::bernstein::binomial;
         let points = (0..6)
             .map(|j| {
                 let f = |a: &[f64; 6]| {

@@ -101,7 +101,8 @@ pub(crate) fn fill_solved(
         boundary.curves.par_iter().map(crate::curve::BezierCurve::quality).collect();
     for (i, quality) in qualities.iter().enumerate() {
         let line = net.curves()[i].line;
-        check_curve(net.curve_place(i), quality, line, &inflections[i], &mut warnings)?;
+        let (place, curve) = (net.curve_place(i), &boundary.curves[i]);
+        check_curve(place, curve, quality, line, &inflections[i], &mut warnings)?;
     }
     let ribbons = line_ribbons(net, &boundary);
     let outlines: Vec<PatchBoundary> = net
@@ -158,7 +159,7 @@ fn line_ribbons(net: &AsymptoticNet, boundary: &Boundary) -> Vec<Option<[DVec3; 
     (0..faces.len())
         .map(|i| {
             let curve = &net.curves()[i];
-            if !curve.line || faces[i] < 2 {
+            if !curve.line || faces[i] < 2 || boundary.curves[i].normals().is_some() {
                 return None;
             }
             let points = boundary.curves[i].offsets();

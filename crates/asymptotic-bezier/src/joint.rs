@@ -19,7 +19,7 @@ use crate::bernstein::{bernstein, eval};
 use crate::boundary::Boundary;
 use crate::data::{AsymptoticNet, NetFace};
 use crate::error::{AsymptoticError, AsymptoticWarning, Place};
-use crate::field::{FieldSpace, line_fields, ribbon_fields, tangent_module};
+use crate::field::{FieldSpace, tangent_fields};
 use crate::fill::{fill_table, thin_plate_block};
 use crate::mask::thin_plate_energy;
 use crate::patch::{CORNER_TOL, FilledPatch, INWARD, PatchBoundary, PatchFamily, RANK_TOL};
@@ -166,10 +166,9 @@ impl<'a> Joint<'a> {
         }
         let spaces: Vec<FieldSpace> = (0..net.curves.len())
             .into_par_iter()
-            .map(|i| match (net.curves[i].line, &ribbons[i]) {
-                (true, Some(ribbon)) => ribbon_fields(&boundary.curves[i], ribbon, degree),
-                (true, None) => line_fields(degree),
-                _ => tangent_module(&boundary.curves[i], &boundary.inflections[i], degree),
+            .map(|i| {
+                let (line, inflections) = (net.curves[i].line, &boundary.inflections[i]);
+                tangent_fields(&boundary.curves[i], line, inflections, ribbons[i].as_ref(), degree)
             })
             .collect();
         let families = net

@@ -299,7 +299,8 @@ impl Profile {
         let step = 1.0 / (SAMPLES - 1) as f64;
         let mut last: Option<(f64, f64)> = None;
         for k in 0..SAMPLES {
-            let jet = table.at(k as f64 * step);
+            let t = k as f64 * step;
+            let jet = table.at(t);
             // Simpson's rule: fourth order, and the samples are needed for the extremes anyway.
             let share = match k {
                 0 => 1.0,
@@ -312,7 +313,7 @@ impl Profile {
             if line {
                 continue;
             }
-            let (kappa, tau) = (jet.curvature(), jet.torsion());
+            let (kappa, tau) = (jet.curvature(), table.torsion(t, &jet));
             out.curvature = out.curvature.max(kappa);
             out.torsion = out.torsion.max(tau.abs());
             out.twist += ds * tau.abs();

@@ -10,7 +10,8 @@
 //! Departures from the paper, and why: the boundary is solved for the corner torsions, which are
 //! its four free parameters (`K = −τ²`); the tangent fields are all polynomial ones instead of a
 //! two-term ansatz, which gives with degree seven what the paper needs eleven for; curves with
-//! inflections and lines have regular patches too.
+//! inflections and lines have regular patches too; nets made from positions get their curves from
+//! polynomial normals by Lelieuvre's formula ([`CurveForm`]), which inflections do not disturb.
 //!
 //! # Example
 //! ```
@@ -43,6 +44,8 @@ mod joint;
 mod lamella;
 mod mask;
 mod net;
+mod normal_curve;
+mod normal_net;
 mod patch;
 mod polylines;
 mod quad;
@@ -55,7 +58,8 @@ mod verify;
 mod vertex;
 
 pub use boundary::{
-    BOUNDARY_DEGREES, Boundary, BoundaryEnergy, BoundaryOptions, TorsionHandle, solve_boundary,
+    BOUNDARY_DEGREES, Boundary, BoundaryEnergy, BoundaryOptions, CurveForm, TorsionHandle,
+    solve_boundary,
 };
 pub use curve::{BezierCurve, CurveJet, CurveQuality};
 pub use data::{AsymptoticNet, CornerData, Curvatures, DATA_DEGREE, NetCurve, NetFace};

@@ -67,7 +67,7 @@ impl AsymptoticNet {
             }
             faces.push(face);
         }
-        let net = Self { positions, curves, faces, single: false };
+        let net = Self { positions, curves, faces, single: false, estimated: false };
         net.check()?;
         Ok(net)
     }
@@ -109,7 +109,8 @@ impl AsymptoticNet {
                 net_curve(ends.map(VertexId::index), chord, derivatives, normals)
             })
             .collect();
-        Self::new(mesh.positions().to_vec(), &quads, curves)
+        let net = Self::new(mesh.positions().to_vec(), &quads, curves)?;
+        Ok(Self { estimated: true, ..net })
     }
 }
 

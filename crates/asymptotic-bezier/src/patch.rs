@@ -7,7 +7,7 @@ use crate::bernstein::{bernstein, elevate, eval};
 use crate::bounds;
 use crate::curve::BezierCurve;
 use crate::error::{AsymptoticError, AsymptoticWarning, Place};
-use crate::field::{FieldSpace, line_fields, paper_ansatz, ribbon_fields, tangent_module};
+use crate::field::{FieldSpace, paper_ansatz, tangent_fields};
 use crate::fill::{MAX_SURFACE_DEGREE, fill_table};
 use crate::mask::{Interior, masked};
 use crate::surface::Patch;
@@ -112,6 +112,10 @@ pub fn fill_patch(
     let paper = 3 * p - 4;
     let tried: &[usize] = match (options.ansatz, options.degree) {
         (Ansatz::Module, Some(n)) => &[n],
+        // Curves made from normals leave their patches as much freedom as quintics do.
+        (Ansatz::Module, None) if boundary.curves.iter().all(|c| c.normals().is_some()) => {
+            &[7, 8, 11]
+        }
         (Ansatz::Module, None) => match p {
             ..=5 => &[7, 8, 11],
             6 => &[8, 9, 12],
@@ -228,13 +232,12 @@ impl PatchFamily {
         let spaces: [FieldSpace; 4] = std::array::from_fn(|i| {
             let curve = &boundary.curves[i];
             match ansatz {
-                _ if boundary.lines[i] => match &boundary.ribbons[i] {
-                    Some(ribbon) => ribbon_fields(curve, ribbon, n),
-                    None => line_fields(n),
-                },
-                Ansatz::Module => tangent_module(curve, &boundary.inflections[i], n),
-                Ansatz::Paper => paper_ansatz(curve, false),
-                Ansatz::PaperFree => paper_ansatz(curve, true),
+                Ansatz::Paper if !boundary.lines[i] => paper_ansatz(curve, false),
+                Ansatz::PaperFree if !boundary.lines[i] => paper_ansatz(curve, true),
+                _ => {
+                    let ribbon = boundary.ribbons[i].as_ref();
+                    tangent_fields(curve, boundary.lines[i], &boundary.inflections[i], ribbon, n)
+                }
             }
         });
         let mut family = Self::framed(boundary, n, spaces);

@@ -74,7 +74,8 @@ impl AsymptoticNet {
                 net_curve(*ends, chord, derivatives, normals)
             })
             .collect();
-        Self::new(positions, &quads, curves)
+        let net = Self::new(positions, &quads, curves)?;
+        Ok(Self { estimated: true, ..net })
     }
 }
 

@@ -207,6 +207,7 @@ pub(crate) fn finish(
     for i in 0..4 {
         check_curve(
             Place::PatchCurve(i),
+            &curves[i],
             &qualities[i],
             data.lines[i],
             &inflections[i],
@@ -248,6 +249,7 @@ pub(crate) fn finish(
 /// Hard faults and warnings of one solved curve.
 pub(crate) fn check_curve(
     place: Place,
+    curve: &BezierCurve,
     quality: &CurveQuality,
     line: bool,
     inflections: &[f64],
@@ -260,7 +262,8 @@ pub(crate) fn check_curve(
     if line {
         return Ok(());
     }
-    if inflections.is_empty() {
+    // Inflections are harmless where they are declared, or the normals are known beforehand.
+    if inflections.is_empty() && curve.normals().is_none() {
         if let Some(t) = quality.reversal {
             return Err(AsymptoticError::UndeclaredInflection { place, t });
         }

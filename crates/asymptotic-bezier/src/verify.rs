@@ -84,8 +84,10 @@ impl PatchCheck {
                 self.normal_curvature = worse(self.normal_curvature, normal_curvature.abs() * size);
                 self.boundary_sine = -worse(-self.boundary_sine, -jet.sine());
                 let near = |t0: &f64| (t - t0).abs() < INFLECTION_GAP;
-                if !boundary.lines[i] && !boundary.inflections[i].iter().any(near) {
-                    let tau = table.at(t).torsion();
+                let known = boundary.curves[i].normals().is_some()
+                    || !boundary.lines[i] && !boundary.inflections[i].iter().any(near);
+                if known {
+                    let tau = table.torsion(t, &table.at(t));
                     let defect = (jet.gaussian_curvature() + tau * tau).abs();
                     self.torsion_defect = worse(self.torsion_defect, defect);
                 }

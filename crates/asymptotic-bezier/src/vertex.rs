@@ -108,7 +108,7 @@ fn fit_normal(directions: &[DVec3], guess: DVec3) -> DVec3 {
 }
 
 /// `±1` per curve: opposite sides of a face share it, neighbours differ; `None` when impossible.
-fn curve_families(net: &AsymptoticNet) -> Option<Vec<f64>> {
+pub(crate) fn curve_families(net: &AsymptoticNet) -> Option<Vec<f64>> {
     let mut family = vec![0.0_f64; net.curves.len()];
     let mut faces_of = vec![Vec::new(); net.curves.len()];
     for (f, face) in net.faces.iter().enumerate() {

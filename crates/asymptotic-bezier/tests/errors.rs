@@ -5,7 +5,7 @@ mod common;
 
 use asymptotic_bezier::{
     AsymptoticError, AsymptoticNet, AsymptoticWarning, BoundaryOptions, CornerData, Curvatures,
-    DataFile, NetCurve, PatchOptions, Place, TorsionHandle, fill_patch, solve_boundary,
+    CurveForm, DataFile, NetCurve, PatchOptions, Place, TorsionHandle, fill_patch, solve_boundary,
     solve_quadrilateral,
 };
 use common::{reference_set, reference_sets};
@@ -111,6 +111,18 @@ fn contradictory_bounds_and_degrees_are_refused() {
     let options = PatchOptions { degree: Some(16), ..Default::default() };
     let error = fill_patch(&quad.boundary, &options, Place::Patch(3)).unwrap_err().to_string();
     assert_eq!(error, "degree 16 of the surface is outside 5..=15");
+}
+
+#[test]
+fn curves_from_normals_have_degree_seven_and_need_two_families() {
+    let net = common::exact_net(common::enneper, [-0.6, 0.9, 0.2, 1.3], [2, 2]);
+    let normals = BoundaryOptions { form: CurveForm::Normals, ..Default::default() };
+    let six = BoundaryOptions { degree: 6, ..normals.clone() };
+    let error = solve_boundary(&net, &six).unwrap_err().to_string();
+    assert_eq!(error, "degree 6 of the boundary is outside 7..=7");
+    let odd = common::star::star(3);
+    let error = solve_boundary(&odd, &normals).unwrap_err().to_string();
+    assert!(error.starts_with("the curves do not fall into two families"), "{error}");
 }
 
 #[test]

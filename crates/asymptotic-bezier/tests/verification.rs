@@ -3,8 +3,9 @@
 mod common;
 
 use asymptotic_bezier::{
-    AsymptoticNet, AsymptoticWarning, BoundaryOptions, GridshellOptions, PatchCheck, PatchOptions,
-    Place, fill_net, fill_patch, solve_quadrilateral,
+    AsymptoticNet, AsymptoticWarning, BoundaryOptions, CurveForm, Gridshell, GridshellCheck,
+    GridshellOptions, Joins, PatchCheck, PatchOptions, Place, TorsionHandle, fill_net, fill_patch,
+    solve_boundary, solve_quadrilateral,
 };
 use common::{catenoid, enneper, exact_net, reference_set, sampled_net};
 
@@ -126,19 +127,69 @@ fn four_straight_lines_give_the_bilinear_patch_or_a_plane() {
     }
 }
 
-/// Across the neck of the catenoid every mesh line has an inflection.
-#[test]
-fn nets_across_inflections_join_without_kinks() {
+/// A net across the neck of the catenoid, where every mesh line has an inflection, and its check.
+fn neck(form: CurveForm, joins: Joins) -> (AsymptoticNet, Gridshell, GridshellCheck) {
     let mesh = sampled_net(catenoid, [-0.7, 0.8, -0.4, 0.5], [5, 5]);
-    let net = AsymptoticNet::from_mesh(&mesh).unwrap();
+    let net = AsymptoticNet::from_mesh(&mesh).expect("an asymptotic net");
     assert!(net.curves().iter().any(|c| c.inflections == 1));
-    let options = GridshellOptions::default();
-    let shell = fill_net(&net, &options).unwrap();
+    let boundary = BoundaryOptions { form, ..Default::default() };
+    let options = GridshellOptions { boundary, joins, ..Default::default() };
+    let shell = fill_net(&net, &options).expect("a net that can be filled");
     let check = shell.verify(&net, &options.patch);
     let sine = check.patches.iter().map(|p| p.sine).fold(1.0, f64::min);
-    println!("kink {:e} deg, sine {sine}, {:?}", check.kink().to_degrees(), check.warnings);
-    assert!(check.kink().to_degrees() <= 1e-8 && sine > 0.5);
+    assert!(check.kink().to_degrees() <= 1e-8 && sine > 0.5, "{check:?}");
     assert!(check.patches.iter().all(|p| p.normal_curvature <= 1e-10));
+    (net, shell, check)
+}
+
+#[test]
+fn nets_across_inflections_join_without_kinks() {
+    neck(CurveForm::Curvatures, Joins::G1);
+    let (net, shell, check) = neck(CurveForm::Normals, Joins::G1);
+    assert_eq!(shell.patches[0].patch.degree(), 7);
+    assert!(check.warnings.is_empty(), "{:?}", check.warnings);
+    for patch in &check.patches {
+        assert!(patch.torsion_defect <= 1e-8 && patch.positive_gauss == 0.0, "{patch:?}");
+    }
+    // K = −1/cosh⁴ on the unit catenoid; the torsions were found from positions alone.
+    for (p, tau) in net.positions().iter().zip(&shell.boundary.torsions) {
+        let exact = p.truncate().length_squared().recip();
+        assert!((tau.abs() / exact - 1.0).abs() < 0.02, "{tau} for {exact}");
+    }
+    // Normals are chosen without being asked for, because of the inflections.
+    let (_, auto, _) = neck(CurveForm::Auto, Joins::G1);
+    assert_eq!(auto, shell);
+}
+
+/// Curves from normals have continuous curvature and derivatives of torsion, all that G2 joins need.
+#[test]
+fn patches_on_curves_from_normals_join_with_continuous_mean_curvature() {
+    let (_, shell, check) = neck(CurveForm::Normals, Joins::G2);
+    assert_eq!(shell.continuous.iter().filter(|c| **c).count(), 40);
+    assert!(check.mean_jump() < 1e-4, "{}", check.mean_jump());
+}
+
+#[test]
+fn torsions_of_curves_from_normals_can_be_prescribed() {
+    let mesh = sampled_net(catenoid, [-0.7, 0.8, -0.4, 0.5], [3, 3]);
+    let net = AsymptoticNet::from_mesh(&mesh).unwrap();
+    let solve = |torsions: Vec<TorsionHandle>| {
+        let options = BoundaryOptions { form: CurveForm::Normals, torsions, ..Default::default() };
+        solve_boundary(&net, &options)
+    };
+    let free = solve(Vec::new()).unwrap().torsions;
+    let sign = free[5].signum();
+    let mut handles = vec![TorsionHandle::Free; 16];
+    handles[5] = TorsionHandle::Fixed(1.1 * free[5]);
+    handles[6] = TorsionHandle::Between(-9.0, 9.0);
+    let bound = 0.95 * free[10];
+    handles[10] = TorsionHandle::Between(bound.min(0.1 * bound), bound.max(0.1 * bound));
+    let found = solve(handles).unwrap();
+    assert!((found.torsions[5] / (1.1 * free[5]) - 1.0).abs() < 1e-12);
+    assert!((found.torsions[10] / bound - 1.0).abs() < 1e-12, "{} {bound}", found.torsions[10]);
+    let wrong = vec![TorsionHandle::Fixed(-sign)];
+    let error = solve(wrong).unwrap_err().to_string();
+    assert!(error.starts_with("vertex 0: the torsion equation has no solution"), "{error}");
 }
 
 #[test]

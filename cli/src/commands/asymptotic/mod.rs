@@ -8,8 +8,8 @@ use crate::context::Context;
 use crate::failure::Failure;
 use crate::outcome::{Outcome, Status};
 use asymptotic_bezier::{
-    Ansatz, AsymptoticNet, BoundaryEnergy, DataFile, Design, DesignOptions, Input, Interior, Joins,
-    RelaxOptions, TorsionHandle, TorsionWish, design, torsion_handles,
+    Ansatz, AsymptoticNet, BoundaryEnergy, CurveForm, DataFile, Design, DesignOptions, Input,
+    Interior, Joins, RelaxOptions, TorsionHandle, TorsionWish, design, torsion_handles,
 };
 use bspline::{BsplineSurface, Degree, KnotVector};
 use exchange::{LengthUnit, Mesh, Model, NamedSurface};
@@ -53,6 +53,10 @@ struct Options {
     /// Degree of the boundary curves, 5 to 9; 4 for exact data of one patch, curvatures unused
     #[arg(long, value_name = "N")]
     boundary_degree: Option<usize>,
+    /// What the boundary curves are made from: tangents and curvatures as given, or normals, which
+    /// inflections do not disturb (default: normals if a net made from positions needs them)
+    #[arg(long, value_enum)]
+    curves: Option<CurvesName>,
     /// What the freedom of the boundary curves minimises
     #[arg(long, value_enum)]
     boundary_energy: Option<EnergyName>,
@@ -96,6 +100,7 @@ crate::layered!(Options {
     ansatz,
     interior,
     boundary_degree,
+    curves,
     boundary_energy,
     from_net,
     joins,
@@ -162,6 +167,13 @@ enum InteriorName {
     Dirichlet,
     Bending,
     Coons,
+}
+
+#[derive(Clone, Copy, Debug, clap::ValueEnum, Deserialize)]
+#[serde(rename_all = "snake_case")]
+enum CurvesName {
+    Curvatures,
+    Normals,
 }
 
 #[derive(Clone, Copy, Debug, clap::ValueEnum, Deserialize)]
@@ -273,6 +285,11 @@ fn design_options(options: &Options, handles: Vec<TorsionHandle>) -> DesignOptio
     if let Some(degree) = options.boundary_degree {
         settings.boundary.degree = degree;
     }
+    settings.boundary.form = match options.curves {
+        None => CurveForm::Auto,
+        Some(CurvesName::Curvatures) => CurveForm::Curvatures,
+        Some(CurvesName::Normals) => CurveForm::Normals,
+    };
     settings.boundary.energy = match options.boundary_energy {
         None | Some(EnergyName::Strain) => BoundaryEnergy::Strain,
         Some(EnergyName::Jerk) => BoundaryEnergy::Jerk,

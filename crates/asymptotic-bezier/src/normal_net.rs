@@ -1,0 +1,492 @@
+//! The curves of a whole net from the normals along them.
+//!
+//! Unknown are the normal at every vertex, the tangent of every mesh line through it and the growth
+//! of the normal along it (one for both sides of a line that goes on), and the middle of the
+//! normals along every curve. So lines of the net have continuous tangents and derivatives of
+//! the torsion at the vertices. Least squares make curves and normals fair and keep tangents and
+//! normals near the data; that every curve reaches its end, and that the curvature is continuous along
+//! lines, is imposed with a large weight and then, by shortest steps, to rounding.
+
+use std::collections::HashMap;
+
+use geom_core::DVec3;
+use gp_solver::{
+    Elements, MinNormProjection, Options, Problem, ProjectionOptions, ResidualBlock, solve,
+};
+use rayon::prelude::*;
+
+use crate::boundary::{Boundary, BoundaryOptions, arm_signs, bilinear_torsions};
+use crate::data::{AsymptoticNet, DATA_DEGREE};
+use crate::error::AsymptoticError;
+use crate::normal_curve::{
+    COLUMNS, CURVE_DEGREE, Continuation, CurveEnd, FAIR_ROWS, NormalCurve, OWN,
+};
+use crate::vertex::{PLANE_TOL, VertexFrame, curve_families, vertex_frames};
+
+/// Estimated torsions are kept above this share of their median: less is noise at flat places.
+const LEAST_TORSION: f64 = 0.05;
+/// Weights of gaps and jumps, in chords, one after the other: a large one from the start would make
+/// the way long.
+const CLOSING: [f64; 3] = [10.0, 100.0, 1000.0];
+/// Weight of the tilt of a normal, in radians.
+const NORMAL_PULL: f64 = 0.1;
+/// Weight of the change of a tangent, relative to its length.
+const TANGENT_PULL: f64 = 0.1;
+/// Weight of the logarithm of the length of a normal, and of its growth: enough to decide what
+/// nothing else does.
+const LENGTH_PULL: f64 = 1e-3;
+/// Arms with an angle of a cosine below this are one line.
+const GOES_ON: f64 = -0.9;
+/// Steps of Levenberg-Marquardt, and the relative decrease that ends them: less is invisible.
+const STEPS: usize = 12;
+const DECREASE: f64 = 1e-4;
+/// Gaps that count as closed, in chords.
+const CLOSED: f64 = 1e-11;
+
+/// Solves for all curves of `net` as [`solve_boundary`](crate::solve_boundary) does, by normals.
+///
+/// # Errors
+/// As there; [`AsymptoticError::NoFamilies`] where torsions cannot alternate around every vertex;
+/// [`AsymptoticError::NotClosed`] where no such curves are found.
+pub(crate) fn solve_by_normals(
+    net: &AsymptoticNet,
+    options: &BoundaryOptions,
+) -> Result<Boundary, AsymptoticError> {
+    if options.degree != CURVE_DEGREE && options.degree != DATA_DEGREE {
+        let (degree, min, max) = (options.degree, CURVE_DEGREE, CURVE_DEGREE);
+        return Err(AsymptoticError::Degree { what: "boundary", degree, min, max });
+    }
+    net.check()?;
+    let mut net = net.clone();
+    if curve_families(&net).is_none() {
+        return Err(AsymptoticError::NoFamilies);
+    }
+    let frames = vertex_frames(&mut net, PLANE_TOL)?;
+    let signs = arm_signs(&net, &frames);
+    let (orientation, mut torsions) = one_sign(&bilinear_torsions(&net, &signs, &frames));
+    let handle = |v: usize| options.torsions.get(v).copied().unwrap_or_default().bounds();
+    let bounds: Vec<[f64; 2]> = (0..torsions.len()).map(handle).collect();
+    let mut held = vec![false; torsions.len()];
+    for (v, &[min, max]) in bounds.iter().enumerate() {
+        let place = net.vertex_place(v);
+        if !(min <= max) {
+            return Err(AsymptoticError::TorsionBounds { place, min, max });
+        }
+        // The torsions of a family have one sign; at zero the normal would have no length.
+        let reach = if orientation > 0.0 { max } else { -min };
+        if !(reach > 0.0) {
+            return Err(AsymptoticError::TorsionInfeasible { place, defect: -reach });
+        }
+        torsions[v] = torsions[v].clamp(min, max);
+        held[v] = min == max;
+    }
+    loop {
+        let mut problem = NormalNet::new(&net, &frames, &signs, &torsions);
+        problem.solve(&held)?;
+        let found = problem.torsions(orientation, &torsions);
+        // Torsions that left their bounds are held there, and the others found again.
+        let mut again = false;
+        for (v, &tau) in found.iter().enumerate() {
+            let bounded = tau.clamp(bounds[v][0], bounds[v][1]);
+            if bounded != tau && !held[v] {
+                (torsions[v], held[v], again) = (bounded, true, true);
+            }
+        }
+        if again {
+            continue;
+        }
+        let curves = problem.curves()?;
+        let normals = problem.normals();
+        return Ok(Boundary {
+            strain_energy: curves.iter().map(|c| c.derivative_energy(2)).sum(),
+            freedoms: problem.freedoms(&held),
+            inflections: vec![Vec::new(); curves.len()],
+            curves,
+            torsions: found,
+            warnings: Vec::new(),
+            signs,
+            normals,
+        });
+    }
+}
+
+/// The common sign of the torsions and their values with it, away from zero.
+fn one_sign(estimated: &[f64]) -> (f64, Vec<f64>) {
+    let mut sorted = estimated.to_vec();
+    sorted.sort_unstable_by(f64::total_cmp);
+    let median = sorted[sorted.len() / 2];
+    let sign = if median < 0.0 { -1.0 } else { 1.0 };
+    let least = LEAST_TORSION * median.abs();
+    (sign, estimated.iter().map(|tau| sign * (sign * tau).max(least)).collect())
+}
+
+/// The problem: what is known of each curve, where its unknowns are, and their values.
+struct NormalNet<'a> {
+    net: &'a AsymptoticNet,
+    frames: &'a [Option<VertexFrame>],
+    curves: Vec<NormalCurve>,
+    columns: Vec<[usize; COLUMNS]>,
+    /// Curve and end of the two sides of every line that goes on at a vertex.
+    continued: Vec<[(usize, usize); 2]>,
+    /// First unknown of the tangents.
+    tangents: usize,
+    x: Vec<f64>,
+}
+
+impl<'a> NormalNet<'a> {
+    fn new(
+        net: &'a AsymptoticNet,
+        frames: &'a [Option<VertexFrame>],
+        signs: &[[f64; 2]],
+        torsions: &[f64],
+    ) -> Self {
+        let tangents = 3 * net.positions.len();
+        let mut out = Self {
+            net,
+            frames,
+            curves: Vec::new(),
+            columns: Vec::new(),
+            continued: Vec::new(),
+            tangents,
+            x: vec![0.0; tangents],
+        };
+        let lines = out.add_tangents();
+        for (i, curve) in net.curves.iter().enumerate() {
+            let mut columns = [0; COLUMNS];
+            let ends = [0, 1].map(|e| {
+                let v = curve.ends[e];
+                let line = &lines[&(i, e)];
+                for k in 0..3 {
+                    columns[3 * e + k] = 3 * v + k;
+                }
+                for k in 0..3 {
+                    columns[6 + 3 * e + k] = line.unknown + k;
+                }
+                let speed = DATA_DEGREE as f64 * curve.arms[e].length();
+                let forward = [1.0, -1.0][e];
+                CurveEnd {
+                    frame: frame_of(frames, v),
+                    length: torsions[v].abs().sqrt().recip(),
+                    speed: forward * line.direction * speed,
+                }
+            });
+            for k in OWN..COLUMNS {
+                columns[k] = out.x.len() + k - OWN;
+            }
+            let sign = (signs[i][0] * torsions[curve.ends[0]]).signum();
+            let data = NormalCurve { chord: net.chord(curve), ends, sign, line: curve.line };
+            let mut own = columns.map(|c| out.x.get(c).copied().unwrap_or(0.0));
+            data.start(&mut own);
+            out.x.extend(&own[OWN..]);
+            out.curves.push(data);
+            out.columns.push(columns);
+        }
+        out
+    }
+
+    /// Numbers the tangents: where two arms of a vertex are one line, they share one.
+    fn add_tangents(&mut self) -> HashMap<(usize, usize), LineAtVertex> {
+        let mut lines = HashMap::new();
+        for (v, frame) in self.frames.iter().enumerate() {
+            let Some(frame) = frame else { continue };
+            let direction = |(i, e): (usize, usize)| self.net.curves[i].arms[e].normalize();
+            let [_, right, left] = frame_of(self.frames, v);
+            for (k, &arm) in frame.arms.iter().enumerate() {
+                if lines.contains_key(&arm) {
+                    continue;
+                }
+                let family: Vec<usize> =
+                    (0..frame.arms.len()).filter(|j| frame.signs[*j] == frame.signs[k]).collect();
+                let partner = family.iter().map(|j| frame.arms[*j]).find(|other| {
+                    *other != arm
+                        && family.len() == 2
+                        && direction(*other).dot(direction(arm)) < GOES_ON
+                });
+                let unknown = self.x.len();
+                lines.insert(arm, LineAtVertex { unknown, direction: 1.0 });
+                let mut tangent = direction(arm);
+                if let Some(other) = partner {
+                    lines.insert(other, LineAtVertex { unknown, direction: -1.0 });
+                    tangent = (tangent - direction(other)).normalize();
+                    // A straight line is straight on both sides.
+                    if !(self.net.curves[arm.0].line && self.net.curves[other.0].line) {
+                        self.continued.push([arm, other]);
+                    }
+                }
+                self.x.extend([tangent.dot(right), tangent.dot(left), 0.0]);
+            }
+        }
+        lines
+    }
+
+    /// Least squares, then shortest steps onto the exact equations.
+    fn solve(&mut self, held: &[bool]) -> Result<(), AsymptoticError> {
+        let start = self.x.clone();
+        let mut scale = vec![1.0; start.len()];
+        for (curve, columns) in self.curves.iter().zip(&self.columns) {
+            let size = 0.5 * (curve.ends[0].length + curve.ends[1].length);
+            columns[OWN..].iter().for_each(|c| scale[*c] = size);
+        }
+        let mut fixed = Vec::new();
+        for (v, frame) in self.frames.iter().enumerate() {
+            match (frame, held[v]) {
+                (None, _) => fixed.extend(3 * v..3 * v + 3),
+                (_, true) => fixed.push(3 * v),
+                _ => {}
+            }
+        }
+        fixed.iter().for_each(|c| scale[*c] = 0.0);
+        let mut elements = Elements::new();
+        self.columns.iter().for_each(|c| elements.push(c, FAIR_ROWS));
+        let mut fair = Fairness { curves: &self.curves, elements };
+        let mut exact = Exactness::new(&self.curves, &self.columns, &self.continued);
+        let mut pull = Pull::new(&start, self.tangents, &self.columns);
+        let options = Options { max_iterations: STEPS, energy_tol: DECREASE, ..Options::default() };
+        let mut x = start.clone();
+        for weight in CLOSING {
+            exact.weight = weight;
+            let mut problem = Problem::new(start.len());
+            fixed.iter().for_each(|c| {
+                problem.fix(*c);
+            });
+            // Normals, lines and curves have three unknowns each.
+            problem.set_runs(3);
+            problem.add(&mut fair).add(&mut exact).add(&mut pull);
+            solve(problem, &mut x, &options).map_err(AsymptoticError::Curves)?;
+        }
+        exact.weight = 1.0;
+        let mut projection =
+            MinNormProjection::new(&exact, x.len(), 3).map_err(AsymptoticError::Curves)?;
+        let options =
+            ProjectionOptions { tolerance: 1e-3 * CLOSED, ..ProjectionOptions::default() };
+        projection.project(&exact, &mut x, &scale, &options).map_err(AsymptoticError::Curves)?;
+        self.x = x;
+        Ok(())
+    }
+
+    fn unknowns(&self, i: usize) -> [f64; COLUMNS] {
+        self.columns[i].map(|c| self.x[c])
+    }
+
+    /// The solved curves.
+    fn curves(&self) -> Result<Vec<crate::curve::BezierCurve>, AsymptoticError> {
+        (0..self.curves.len())
+            .map(|i| {
+                let (data, x) = (&self.curves[i], self.unknowns(i));
+                let mut exact = [0.0; 6];
+                data.exactness(&x, &mut exact, None);
+                let gap = exact.iter().fold(0.0_f64, |a, b| a.max(b.abs()));
+                if !(gap <= CLOSED) {
+                    return Err(AsymptoticError::NotClosed { place: self.net.curve_place(i), gap });
+                }
+                Ok(data.curve(&x, self.net.curves[i].ends.map(|v| self.net.positions[v])))
+            })
+            .collect()
+    }
+
+    /// Torsion per vertex with the sign of the first family.
+    fn torsions(&self, sign: f64, before: &[f64]) -> Vec<f64> {
+        let mut out = before.to_vec();
+        for (i, curve) in self.net.curves.iter().enumerate() {
+            for e in 0..2 {
+                out[curve.ends[e]] = sign * self.curves[i].torsion(e, &self.unknowns(i));
+            }
+        }
+        out
+    }
+
+    /// Unit normal per vertex.
+    fn normals(&self) -> Vec<DVec3> {
+        (0..self.net.positions.len())
+            .map(|v| {
+                let [up, right, left] = frame_of(self.frames, v);
+                (up + right * self.x[3 * v + 1] + left * self.x[3 * v + 2]).normalize()
+            })
+            .collect()
+    }
+
+    /// Unknowns less equations.
+    fn freedoms(&self, held: &[bool]) -> usize {
+        let equations =
+            self.curves.iter().map(NormalCurve::exact_rows).sum::<usize>() + self.continued.len();
+        let fixed = held.iter().filter(|h| **h).count();
+        self.x.len().saturating_sub(equations + fixed)
+    }
+}
+
+/// The tangent of an arm: its first unknown, and whether the arm runs with or against it.
+struct LineAtVertex {
+    unknown: usize,
+    direction: f64,
+}
+
+fn frame_of(frames: &[Option<VertexFrame>], v: usize) -> [DVec3; 3] {
+    let up = frames[v].as_ref().map_or(DVec3::Z, |f| f.normal);
+    let right = up.any_orthonormal_vector();
+    [up, right, up.cross(right)]
+}
+
+fn gather(x: &[f64], columns: &[usize]) -> [f64; COLUMNS] {
+    std::array::from_fn(|k| x[columns[k]])
+}
+
+/// [`NormalCurve::fairness`] of all curves.
+struct Fairness<'a> {
+    curves: &'a [NormalCurve],
+    elements: Elements,
+}
+
+impl ResidualBlock for Fairness<'_> {
+    fn name(&self) -> &str {
+        "fairness"
+    }
+
+    fn elements(&self) -> &Elements {
+        &self.elements
+    }
+
+    fn residuals(&self, x: &[f64], residuals: &mut [f64]) {
+        let each = residuals.par_chunks_exact_mut(FAIR_ROWS).zip(self.curves).enumerate();
+        each.for_each(|(e, (out, curve))| {
+            curve.fairness(&gather(x, self.elements.columns(e)), out, None);
+        });
+    }
+
+    fn linearize(&self, x: &[f64], residuals: &mut [f64], jacobian: &mut [f64]) {
+        let jacobians = jacobian.par_chunks_exact_mut(FAIR_ROWS * COLUMNS);
+        let rows = residuals.par_chunks_exact_mut(FAIR_ROWS).zip(jacobians);
+        rows.zip(self.curves).enumerate().for_each(|(e, ((out, jacobian), curve))| {
+            curve.fairness(&gather(x, self.elements.columns(e)), out, Some(jacobian));
+        });
+    }
+}
+
+/// [`NormalCurve::exactness`] of all curves, then [`Continuation::jump`] of all lines.
+struct Exactness<'a> {
+    curves: &'a [NormalCurve],
+    columns: &'a [[usize; COLUMNS]],
+    continued: &'a [[(usize, usize); 2]],
+    /// For each continuation, which of its columns the second curve's unknowns are.
+    second: Vec<[usize; COLUMNS]>,
+    elements: Elements,
+    weight: f64,
+}
+
+impl<'a> Exactness<'a> {
+    fn new(
+        curves: &'a [NormalCurve],
+        columns: &'a [[usize; COLUMNS]],
+        continued: &'a [[(usize, usize); 2]],
+    ) -> Self {
+        let mut elements = Elements::new();
+        for (curve, columns) in curves.iter().zip(columns) {
+            elements.push(columns, curve.exact_rows());
+        }
+        let mut second = Vec::with_capacity(continued.len());
+        for [(a, _), (b, _)] in continued {
+            let mut all = columns[*a].to_vec();
+            second.push(columns[*b].map(|c| {
+                all.iter().position(|known| *known == c).unwrap_or_else(|| {
+                    all.push(c);
+                    all.len() - 1
+                })
+            }));
+            elements.push(&all, 1);
+        }
+        Self { curves, columns, continued, second, elements, weight: 1.0 }
+    }
+
+    fn fill(&self, x: &[f64], residuals: &mut [f64], mut jacobian: Option<&mut [f64]>) {
+        let unknowns = |i: usize| gather(x, &self.columns[i]);
+        for (e, curve) in self.curves.iter().enumerate() {
+            let range = self.elements.jacobian_range(e);
+            let slopes = jacobian.as_deref_mut().map(|j| &mut j[range]);
+            curve.exactness(&unknowns(e), &mut residuals[self.elements.rows(e)], slopes);
+        }
+        for (k, [(a, e), (b, f)]) in self.continued.iter().enumerate() {
+            let element = self.curves.len() + k;
+            let lines = Continuation { curves: [(&self.curves[*a], *e), (&self.curves[*b], *f)] };
+            let mut slopes = [[0.0; COLUMNS]; 2];
+            let wanted = jacobian.is_some().then_some(&mut slopes);
+            let row = self.elements.rows(element).start;
+            residuals[row] = lines.jump([&unknowns(*a), &unknowns(*b)], wanted);
+            if let Some(jacobian) = jacobian.as_deref_mut() {
+                let out = &mut jacobian[self.elements.jacobian_range(element)];
+                out.fill(0.0);
+                out[..COLUMNS].copy_from_slice(&slopes[0]);
+                for (place, slope) in self.second[k].iter().zip(slopes[1]) {
+                    out[*place] += slope;
+                }
+            }
+        }
+        residuals.iter_mut().chain(jacobian.into_iter().flatten()).for_each(|r| *r *= self.weight);
+    }
+}
+
+impl ResidualBlock for Exactness<'_> {
+    fn name(&self) -> &str {
+        "closing"
+    }
+
+    fn elements(&self) -> &Elements {
+        &self.elements
+    }
+
+    fn residuals(&self, x: &[f64], residuals: &mut [f64]) {
+        self.fill(x, residuals, None);
+    }
+
+    fn linearize(&self, x: &[f64], residuals: &mut [f64], jacobian: &mut [f64]) {
+        self.fill(x, residuals, Some(jacobian));
+    }
+}
+
+/// Keeps normals and tangents near their start.
+struct Pull {
+    elements: Elements,
+    weights: Vec<f64>,
+    start: Vec<f64>,
+}
+
+impl Pull {
+    fn new(start: &[f64], tangents: usize, columns: &[[usize; COLUMNS]]) -> Self {
+        let end = columns.first().map_or(start.len(), |c| c[OWN]);
+        let mut elements = Elements::new();
+        let mut weights = Vec::with_capacity(end);
+        for c in 0..end {
+            elements.push(&[c], 1);
+            weights.push(match (c >= tangents, c % 3) {
+                (true, 2) | (false, 0) => LENGTH_PULL,
+                (true, _) => TANGENT_PULL,
+                (false, _) => NORMAL_PULL,
+            });
+        }
+        Self { elements, weights, start: start[..end].to_vec() }
+    }
+}
+
+impl ResidualBlock for Pull {
+    fn name(&self) -> &str {
+        "data"
+    }
+
+    fn elements(&self) -> &Elements {
+        &self.elements
+    }
+
+    fn residuals(&self, x: &[f64], residuals: &mut [f64]) {
+        for (((r, w), x), start) in residuals.iter_mut().zip(&self.weights).zip(x).zip(&self.start)
+        {
+            *r = w * (x - start);
+        }
+    }
+
+    fn linearize(&self, x: &[f64], residuals: &mut [f64], jacobian: &mut [f64]) {
+        self.residuals(x, residuals);
+        jacobian.copy_from_slice(&self.weights);
+    }
+
+    fn is_linear(&self) -> bool {
+        true
+    }
+}
