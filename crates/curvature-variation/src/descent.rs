@@ -227,6 +227,8 @@ impl Level<'_> {
     fn factor(&mut self, gauss_newton: bool, mut sobolev: f64) -> Result<usize, SolverError> {
         let area = self.area();
         let Some(metric) = &mut self.metric else { return Ok(0) };
+        // The patches' gradients are not needed while the matrix is there.
+        self.work = Workspace::default();
         let mut coefficients = self.energy.coefficients();
         coefficients.plain.root_epsilon = ROOT_EPSILON / area;
         let density = coefficients.plain.plus(area, &coefficients.scaled);

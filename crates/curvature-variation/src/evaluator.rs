@@ -26,9 +26,13 @@ pub(crate) struct Group {
     pub(crate) controls: Vec<u32>,
     /// How many copies of every patch the surface has.
     pub(crate) multiplicity: f64,
-    /// First control point slot among those of all groups.
-    first_slot: usize,
     first_patch: usize,
+    /// Patches of one run: a worker's share, whose gradients are added up as they come.
+    run: usize,
+    /// Slot of every control point among those of its run.
+    places: Vec<u16>,
+    /// First slot of every run among those of all groups, and where the last one ends.
+    run_starts: Vec<u32>,
 }
 
 impl Group {
@@ -40,15 +44,16 @@ impl Group {
 /// Evaluates energies of a subdivision surface, given its control points as a flat list of
 /// coordinates.
 ///
-/// Every patch writes its own gradient; the vertices then collect them in a fixed order, so the
-/// result is the same to the last bit for any number of threads.
+/// Every run of patches writes its own gradient; the vertices then collect them in a fixed order, so
+/// the result is the same to the last bit for any number of threads.
 pub struct SurfaceEnergy {
     arch: Arch,
     groups: Vec<Group>,
     vertex_count: usize,
     patch_count: usize,
     slot_count: usize,
-    // For every vertex its slots, compressed: `slots[starts[v]..starts[v + 1]]`.
+    // For every vertex its slots, one per run that touches it, compressed:
+    // `slots[starts[v]..starts[v + 1]]`.
     starts: Vec<u32>,
     slots: Vec<u32>,
     // Factor of a slot's gradient: the multiplicity of its patch.
@@ -167,44 +172,60 @@ impl SurfaceEnergy {
                 Rule::Table(table) => table.controls,
             };
             let patches = controls.len() / per_patch;
-            let (first_slot, first_patch) = (this.slot_count, this.patch_count);
-            this.slot_count += controls.len();
-            this.patch_count += patches;
+            let run = if matches!(rule, Rule::Separable(_)) { RUN } else { 1 };
             this.groups.push(Group {
                 rule,
                 basis,
                 per_patch,
                 controls,
                 multiplicity: f64::from(multiplicity),
-                first_slot,
-                first_patch,
+                first_patch: this.patch_count,
+                run,
+                places: Vec::new(),
+                run_starts: Vec::new(),
             });
+            this.patch_count += patches;
         }
         this.list_slots();
         this
     }
 
     fn list_slots(&mut self) {
-        let mut starts = vec![0_u32; self.vertex_count + 1];
-        for group in &self.groups {
-            for &v in &group.controls {
-                starts[v as usize + 1] += 1;
+        let mut vertices: Vec<u32> = Vec::new();
+        let mut factors: Vec<f64> = Vec::new();
+        // Slot of a vertex in the run that met it last, and that run's first slot.
+        let mut met = vec![(u32::MAX, 0_u16); self.vertex_count];
+        for group in &mut self.groups {
+            for controls in group.controls.chunks(group.run * group.per_patch) {
+                let first = vertices.len() as u32;
+                group.run_starts.push(first);
+                for &v in controls {
+                    let (run, place) = &mut met[v as usize];
+                    if *run != first {
+                        (*run, *place) = (first, (vertices.len() - first as usize) as u16);
+                        vertices.push(v);
+                        factors.push(group.multiplicity);
+                    }
+                    group.places.push(*place);
+                }
             }
+            group.run_starts.push(vertices.len() as u32);
+        }
+        let mut starts = vec![0_u32; self.vertex_count + 1];
+        for &v in &vertices {
+            starts[v as usize + 1] += 1;
         }
         for v in 0..self.vertex_count {
             starts[v + 1] += starts[v];
         }
         let mut next = starts.clone();
-        self.slots = vec![0; self.slot_count];
-        self.slot_factors = vec![0.0; self.slot_count];
-        for group in &self.groups {
-            for (k, &v) in group.controls.iter().enumerate() {
-                let slot = group.first_slot + k;
-                self.slots[next[v as usize] as usize] = slot as u32;
-                self.slot_factors[slot] = group.multiplicity;
-                next[v as usize] += 1;
-            }
+        self.slots = vec![0; vertices.len()];
+        for (slot, &v) in vertices.iter().enumerate() {
+            self.slots[next[v as usize] as usize] = slot as u32;
+            next[v as usize] += 1;
         }
+        self.slot_count = vertices.len();
+        self.slot_factors = factors;
         self.starts = starts;
     }
 
@@ -369,20 +390,20 @@ impl SurfaceEnergy {
             let patches = group.patches();
             let (now, rest) = std::mem::take(&mut integrals).split_at_mut(patches);
             integrals = rest;
-            let width = if with_gradient { GRADIENT_LEN * group.per_patch } else { 0 };
-            let (mut slots, rest) = std::mem::take(&mut gradients).split_at_mut(width * patches);
-            gradients = rest;
-            let run = if matches!(group.rule, Rule::Separable(_)) { RUN } else { 1 };
-            for (integrals, controls) in
-                now.chunks_mut(run).zip(group.controls.chunks(run * group.per_patch))
+            let width = if with_gradient { GRADIENT_LEN } else { 0 };
+            let share = group.run * group.per_patch;
+            let shares = group.controls.chunks(share).zip(group.places.chunks(share));
+            for ((integrals, share), bounds) in
+                now.chunks_mut(group.run).zip(shares).zip(group.run_starts.windows(2))
             {
-                let (now, rest) = std::mem::take(&mut slots).split_at_mut(width * integrals.len());
-                slots = rest;
-                runs.push((group, controls, integrals, now));
+                let slots = (bounds[1] - bounds[0]) as usize;
+                let (now, rest) = std::mem::take(&mut gradients).split_at_mut(width * slots);
+                gradients = rest;
+                runs.push((group, share, integrals, now));
             }
         }
         let arch = self.arch;
-        runs.into_par_iter().for_each(|(group, controls, integrals, gradients)| {
+        runs.into_par_iter().for_each(|(group, (controls, places), integrals, gradients)| {
             let per_patch = group.per_patch;
             match &group.rule {
                 Rule::Separable(rule) => arch.dispatch(PatchRun {
@@ -390,6 +411,7 @@ impl SurfaceEnergy {
                     task,
                     positions,
                     controls,
+                    places,
                     per_patch,
                     integrals,
                     gradients,
@@ -399,6 +421,7 @@ impl SurfaceEnergy {
                     task,
                     positions,
                     controls,
+                    places,
                     per_patch,
                     integrals,
                     gradients,

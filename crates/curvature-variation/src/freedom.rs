@@ -60,6 +60,24 @@ impl Freedom {
         self.copies.len()
     }
 
+    /// For every vertex with unknowns their number in the order of the unknowns, the same for the
+    /// vertices that share them, and `u32::MAX` for the others; and first unknown and number of
+    /// unknowns of every block.
+    pub(crate) fn blocks(&self) -> (Vec<u32>, Vec<(usize, usize)>) {
+        let mut first: Vec<(usize, usize)> = Vec::new();
+        let mut block_of = vec![u32::MAX; self.base.len()];
+        let mut at = vec![u32::MAX; self.len()];
+        for v in (0..self.base.len()).filter(|&v| self.dim[v] > 0) {
+            let start = self.start[v] as usize;
+            if at[start] == u32::MAX {
+                at[start] = first.len() as u32;
+                first.push((start, self.dim[v] as usize));
+            }
+            block_of[v] = at[start];
+        }
+        (block_of, first)
+    }
+
     /// The unknowns that come nearest to `x`.
     pub(crate) fn restrict(&self, x: &[f64]) -> Vec<f64> {
         let mut y = vec![0.0; self.len()];

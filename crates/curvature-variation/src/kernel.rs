@@ -3,7 +3,7 @@
 use crate::density::{Density, Derivatives, Shape};
 use crate::lanes::{Lanes, Vec3, scaled};
 use crate::rules::{SeparableRule, Table};
-use pulp::{Simd, WithSimd};
+use pulp::{Simd, WithSimd, bytemuck};
 
 /// Orders of the nine derivatives.
 pub(crate) const ORDER_U: [usize; 9] = [1, 0, 2, 1, 0, 3, 2, 1, 0];
@@ -30,10 +30,12 @@ pub(crate) struct PatchRun<'a, R> {
     pub(crate) positions: &'a [f64],
     /// Control points, patch after patch.
     pub(crate) controls: &'a [u32],
+    /// Where every control point's gradient goes.
+    pub(crate) places: &'a [u16],
     pub(crate) per_patch: usize,
     /// `[area, integral]` per patch.
     pub(crate) integrals: &'a mut [[f64; 2]],
-    /// [`GRADIENT_LEN`] values per control point, patch after patch; empty without gradients.
+    /// [`GRADIENT_LEN`] values per place, the sums over all patches; empty without gradients.
     pub(crate) gradients: &'a mut [f64],
 }
 
@@ -59,28 +61,50 @@ struct Sampled<S: Simd> {
 
 #[inline(always)]
 fn sample<S: Simd>(d: &Derivatives<S>, weight: Lanes<S>, task: Task<'_>) -> Sampled<S> {
-    let simd = weight.0;
-    let nothing = zero(simd);
     let shape = Shape::new(d);
     let area = shape.area * weight;
-    let mut out = Sampled {
-        area,
-        integral: Lanes::splat(simd, 0.0),
-        adjoint: [nothing; 9],
-        area_adjoint: [nothing; 2],
+    if let Task::Gradient(density) = task {
+        let (value, adjoint) = shape.density(density);
+        let [u, v] = shape.area_adjoint(d);
+        return Sampled {
+            area,
+            integral: value * weight,
+            adjoint: shape.pull_back(d, &adjoint.scaled(weight)),
+            area_adjoint: [scaled(&u, weight), scaled(&v, weight)],
+        };
+    }
+    let integral = match task {
+        Task::Energy(density) => shape.density(density).0 * weight,
+        _ => Lanes::splat(weight.0, 0.0),
     };
-    match task {
-        Task::Area => {}
-        Task::Energy(density) => out.integral = shape.density(density).0 * weight,
-        Task::Gradient(density) => {
-            let (value, adjoint) = shape.density(density);
-            out.integral = value * weight;
-            out.adjoint = shape.pull_back(d, &adjoint.scaled(weight));
-            let [u, v] = shape.area_adjoint(d);
-            out.area_adjoint = [scaled(&u, weight), scaled(&v, weight)];
+    let nothing = zero(weight.0);
+    Sampled { area, integral, adjoint: [nothing; 9], area_adjoint: [nothing; 2] }
+}
+
+/// Adds the sums over the lanes of each vector to `out`.
+#[inline(always)]
+fn add_lanes<S: Simd>(vectors: &[S::f64s], out: &mut [f64]) {
+    let values: &[f64] = bytemuck::cast_slice(vectors);
+    // One after the other they would each take as many operations as four together.
+    match S::F64_LANES {
+        4 => {
+            for (sum, v) in out.iter_mut().zip(values.as_chunks::<4>().0) {
+                *sum += (v[0] + v[1]) + (v[2] + v[3]);
+            }
+        }
+        8 => {
+            for (sum, v) in out.iter_mut().zip(values.as_chunks::<8>().0) {
+                *sum += ((v[0] + v[1]) + (v[2] + v[3])) + ((v[4] + v[5]) + (v[6] + v[7]));
+            }
+        }
+        lanes => {
+            for (sum, v) in out.iter_mut().zip(values.chunks_exact(lanes)) {
+                for x in v {
+                    *sum += x;
+                }
+            }
         }
     }
-    out
 }
 
 /// The first `3 · groups` derivatives at one vector of samples, from the table's weights (which
@@ -148,6 +172,7 @@ impl WithSimd for PatchRun<'_, Table> {
         let with_gradient = matches!(self.task, Task::Gradient(_));
         let mut sums = vec![[zero(simd); 2]; if with_gradient { count } else { 0 }];
         let mut points = vec![[0.0; 3]; count];
+        self.gradients.fill(0.0);
         let groups = if self.task == Task::Area { 1 } else { 3 };
         for (patch, integrals) in self.integrals.iter_mut().enumerate() {
             let controls = &self.controls[patch * count..(patch + 1) * count];
@@ -179,12 +204,12 @@ impl WithSimd for PatchRun<'_, Table> {
             }
             *integrals = [area.sum(), integral.sum()];
             if with_gradient {
-                let start = patch * count * GRADIENT_LEN;
-                let out = &mut self.gradients[start..start + count * GRADIENT_LEN];
-                for (g, sum) in out.chunks_exact_mut(GRADIENT_LEN).zip(&sums) {
+                let places = &self.places[patch * count..(patch + 1) * count];
+                for (&place, sum) in places.iter().zip(&sums) {
+                    let g = &mut self.gradients[GRADIENT_LEN * place as usize..][..GRADIENT_LEN];
                     for c in 0..3 {
-                        g[c] = sum[0][c].sum();
-                        g[3 + c] = sum[1][c].sum();
+                        g[c] += sum[0][c].sum();
+                        g[3 + c] += sum[1][c].sum();
                     }
                 }
             }
@@ -205,6 +230,13 @@ impl WithSimd for PatchRun<'_, SeparableRule> {
         let (weights, _) = S::as_simd_f64s(&rule.weights);
         let with_gradient = matches!(self.task, Task::Gradient(_));
         let orders = if self.task == Task::Area { 2 } else { 4 };
+        self.gradients.fill(0.0);
+        // Overwritten by every patch, and so outside the loop, which would clear them each time.
+        let mut rows = [[zero(simd); 4]; 4];
+        let mut at = [[Lanes::splat(simd, 0.0); 4]; 4];
+        let mut d: Derivatives<S> = [zero(simd); 9];
+        let nothing = simd.splat_f64s(0.0);
+        let mut sums = [nothing; 16 * GRADIENT_LEN];
         for (patch, integrals) in self.integrals.iter_mut().enumerate() {
             let controls: &[u32; 16] = match self.controls[16 * patch..].first_chunk() {
                 Some(controls) => controls,
@@ -217,10 +249,8 @@ impl WithSimd for PatchRun<'_, SeparableRule> {
             }
             let mut area = Lanes::splat(simd, 0.0);
             let mut integral = area;
-            let mut out = [0.0; 16 * GRADIENT_LEN];
             for chunk in 0..chunks {
                 // Along v for every row of control points, then along u for every node.
-                let mut rows = [[zero(simd); 4]; 4];
                 for order in 0..orders {
                     for i in 0..4 {
                         let mut sum = zero(simd);
@@ -237,14 +267,12 @@ impl WithSimd for PatchRun<'_, SeparableRule> {
                 let mut back = [[zero(simd); 4]; 4];
                 let mut area_back = [[zero(simd); 4]; 2];
                 for node in 0..rule.nodes {
-                    let mut at = [[Lanes::splat(simd, 0.0); 4]; 4];
                     for (order, at) in at.iter_mut().enumerate() {
                         for (i, at) in at.iter_mut().enumerate() {
                             let value = rule.basis[(4 * order + i) * rule.padded + node];
                             *at = Lanes::splat(simd, value);
                         }
                     }
-                    let mut d: Derivatives<S> = [zero(simd); 9];
                     let needed = if self.task == Task::Area { 2 } else { 9 };
                     for k in 0..needed {
                         let mut sum = zero(simd);
@@ -289,15 +317,17 @@ impl WithSimd for PatchRun<'_, SeparableRule> {
                             *t = Lanes(simd, basis[(4 * order + j) * lanes_per_row + chunk]);
                         }
                         for i in 0..4 {
-                            let k = GRADIENT_LEN * rule.order[4 * i + j];
+                            let k = GRADIENT_LEN * (4 * i + j);
                             for c in 0..3 {
-                                let mut sum = t[0] * back[0][i][c];
+                                let before = if chunk > 0 { sums[k + c] } else { nothing };
+                                let mut sum = t[0].fma(back[0][i][c], Lanes(simd, before));
                                 for order in 1..4 {
                                     sum = t[order].fma(back[order][i][c], sum);
                                 }
-                                out[k + c] += sum.sum();
-                                let sum = t[0].fma(area_back[0][i][c], t[1] * area_back[1][i][c]);
-                                out[k + 3 + c] += sum.sum();
+                                sums[k + c] = sum.1;
+                                let before = if chunk > 0 { sums[k + 3 + c] } else { nothing };
+                                let sum = t[1].fma(area_back[1][i][c], Lanes(simd, before));
+                                sums[k + 3 + c] = t[0].fma(area_back[0][i][c], sum).1;
                             }
                         }
                     }
@@ -305,8 +335,10 @@ impl WithSimd for PatchRun<'_, SeparableRule> {
             }
             *integrals = [area.sum(), integral.sum()];
             if with_gradient {
-                let start = patch * out.len();
-                self.gradients[start..start + out.len()].copy_from_slice(&out);
+                for (&k, sums) in rule.order.iter().zip(sums.chunks_exact(GRADIENT_LEN)) {
+                    let place = GRADIENT_LEN * self.places[16 * patch + k] as usize;
+                    add_lanes::<S>(sums, &mut self.gradients[place..place + GRADIENT_LEN]);
+                }
             }
         }
     }

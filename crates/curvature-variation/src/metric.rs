@@ -55,12 +55,17 @@ impl MetricRule {
 }
 
 /// A metric on the unknowns, with the structure of its matrix worked out once.
+///
+/// The unknowns of a vertex form a block, and all columns of a block have the same rows, so that
+/// the structure is kept by blocks, in the order in which they are eliminated.
 pub(crate) struct MetricAssembly {
     rules: Vec<MetricRule>,
     cholesky: SparseCholesky,
-    // For every ordered pair of a patch's control points and every unknown of the second one, where
-    // the first unknown of the first one stands; patch after patch.
-    slots: Vec<u32>,
+    // Where every unknown comes in the order of elimination.
+    place: Vec<u32>,
+    // For every ordered pair of a patch's control points how far down in the columns of the second
+    // one the first unknown of the first one stands; patch after patch.
+    offsets: Vec<u32>,
     // What the pulls add: constant, so kept as slots and values.
     pulls: Vec<(u32, f64)>,
 }
@@ -85,35 +90,22 @@ impl MetricAssembly {
                 MetricRule::new(Table::new(surface, group.basis, nodes))
             })
             .collect();
-        let mut pairs = Vec::new();
-        for_pairs(evaluator.groups(), freedom, |a, b| pairs.push((a as u32, b as u32)));
-        pairs.sort_unstable();
-        pairs.dedup();
-        let entries = pairs.iter().flat_map(|&(a, b)| {
-            let (a, b) = (a as usize, b as usize);
-            let (i0, j0) = (freedom.start[a] as usize, freedom.start[b] as usize);
-            (0..freedom.dim[b] as usize)
-                .flat_map(move |j| (0..freedom.dim[a] as usize).map(move |i| (i0 + i, j0 + j)))
-        });
-        let pulls = pull_entries(freedom, pulls);
-        let pulled = pulls.iter().map(|&(at, _)| at);
-        let pattern = SymmetricPattern::new(freedom.len(), entries.chain(pulled))?;
-        drop(pairs);
-        let pulls = pulls
-            .iter()
-            .map(|&((i, j), value)| (pattern.slot(i, j).unwrap_or(0) as u32, value))
+        let (pattern, place) = eliminated_pattern(evaluator.groups(), freedom, pulls)?;
+        let pulls = pull_entries(freedom, pulls)
+            .into_iter()
+            .map(|((i, j), value)| {
+                let slot = pattern.slot(place[i] as usize, place[j] as usize);
+                (slot.unwrap_or(0) as u32, value)
+            })
             .collect();
-        let mut slots = Vec::new();
-        for_pairs(evaluator.groups(), freedom, |a, b| {
-            let (i0, j0) = (freedom.start[a] as usize, freedom.start[b] as usize);
-            for j in 0..freedom.dim[b] as usize {
-                // On the diagonal the rows of a column start at the column itself.
-                let slot = pattern.slot(i0.max(j0 + usize::from(i0 == j0) * j), j0 + j);
-                slots.push(slot.unwrap_or(0) as u32);
-            }
+        let mut offsets = Vec::new();
+        for_pairs(evaluator.groups(), freedom, &place, |a, b| {
+            let slot = pattern.slot(a, b).unwrap_or(0);
+            offsets.push((slot - pattern.column_starts()[b]) as u32);
         });
-        slots.shrink_to_fit();
-        Ok(Self { rules, cholesky: SparseCholesky::new(pattern)?, slots, pulls })
+        offsets.shrink_to_fit();
+        let cholesky = SparseCholesky::in_given_order(pattern)?;
+        Ok(Self { rules, cholesky, place, offsets, pulls })
     }
 
     /// Number of stored values of the factor.
@@ -121,10 +113,14 @@ impl MetricAssembly {
         self.cholesky.factor_len()
     }
 
-    /// Structure of the matrix.
+    /// `A x` for the matrix with these values.
     #[cfg(test)]
-    pub(crate) fn pattern(&self) -> &SymmetricPattern {
-        self.cholesky.pattern()
+    pub(crate) fn multiply(&self, values: &[f64], x: &[f64]) -> Vec<f64> {
+        let mut image = vec![0.0; x.len()];
+        let mut placed = vec![0.0; x.len()];
+        self.place.iter().zip(x).for_each(|(&p, &x)| placed[p as usize] = x);
+        self.cholesky.pattern().multiply(values, &placed, &mut image);
+        self.place.iter().map(|&p| image[p as usize]).collect()
     }
 
     /// Assembles and factors the metric at `positions`.
@@ -160,7 +156,7 @@ impl MetricAssembly {
         mixture: &Mixture,
     ) -> Vec<f64> {
         let mut values = vec![0.0; self.cholesky.pattern().len()];
-        let mut next_slot = 0;
+        let mut next_pair = 0;
         let mean_area = area / evaluator.weighted_patches();
         for (group, rule) in evaluator.groups().iter().zip(&self.rules) {
             let width = element_width(group.per_patch);
@@ -183,13 +179,13 @@ impl MetricAssembly {
                 for (matrix, controls) in
                     matrices.chunks(width * width).zip(controls.chunks(group.per_patch))
                 {
-                    next_slot = self.scatter(
+                    next_pair = self.scatter(
                         matrix,
                         width,
                         controls,
                         group.multiplicity,
                         freedom,
-                        next_slot,
+                        next_pair,
                         &mut values,
                     );
                 }
@@ -202,7 +198,10 @@ impl MetricAssembly {
     }
 
     pub(crate) fn solve_in_place(&self, rhs: &mut [f64]) {
-        self.cholesky.solve_in_place(rhs);
+        let mut placed = vec![0.0; rhs.len()];
+        self.place.iter().zip(&*rhs).for_each(|(&p, &x)| placed[p as usize] = x);
+        self.cholesky.solve_in_place(&mut placed);
+        self.place.iter().zip(rhs).for_each(|(&p, x)| *x = placed[p as usize]);
     }
 
     fn scatter(
@@ -212,21 +211,30 @@ impl MetricAssembly {
         controls: &[u32],
         factor: f64,
         freedom: &Freedom,
-        mut next_slot: usize,
+        mut next_pair: usize,
         values: &mut [f64],
     ) -> usize {
+        let starts = self.cholesky.pattern().column_starts();
         for (p, &a) in controls.iter().enumerate() {
             let a = a as usize;
-            let (i0, rows) = (freedom.start[a], freedom.dim[a] as usize);
+            let rows = freedom.dim[a] as usize;
+            if rows == 0 {
+                continue;
+            }
+            let i0 = self.place[freedom.start[a] as usize] as usize;
             for (q, &b) in controls.iter().enumerate() {
                 let b = b as usize;
-                let (j0, columns) = (freedom.start[b], freedom.dim[b] as usize);
-                if rows == 0 || columns == 0 || i0 < j0 {
+                let columns = freedom.dim[b] as usize;
+                if columns == 0 {
                     continue;
                 }
+                let j0 = self.place[freedom.start[b] as usize] as usize;
+                if i0 < j0 {
+                    continue;
+                }
+                let offset = self.offsets[next_pair] as usize;
+                next_pair += 1;
                 for j in 0..columns {
-                    let slot = self.slots[next_slot] as usize;
-                    next_slot += 1;
                     let direction = freedom.frame[b].col(j).to_array();
                     let image: [f64; 3] = std::array::from_fn(|c| {
                         (0..3)
@@ -237,30 +245,81 @@ impl MetricAssembly {
                             })
                             .sum()
                     });
+                    // A column begins with its own row, so the block's later ones are shorter at
+                    // the top.
                     let first = if i0 == j0 { j } else { 0 };
+                    let slot = starts[j0 + j] + offset - j;
                     for i in first..rows {
                         let row = freedom.frame[a].col(i).to_array();
                         let value = row[0] * image[0] + row[1] * image[1] + row[2] * image[2];
-                        values[slot + i - first] += factor * value;
+                        values[slot + i] += factor * value;
                     }
                 }
             }
         }
-        next_slot
+        next_pair
     }
 }
 
-// Ordered pairs of control points that have unknowns, the first one's not before the second one's.
-fn for_pairs(groups: &[Group], freedom: &Freedom, mut visit: impl FnMut(usize, usize)) {
+/// Structure of the matrix with the unknowns in the order of elimination, and where each comes.
+fn eliminated_pattern(
+    groups: &[Group],
+    freedom: &Freedom,
+    pulls: &[Pull],
+) -> Result<(SymmetricPattern, Vec<u32>), SolverError> {
+    let (block_of, blocks) = freedom.blocks();
+    let clique = |controls: &mut dyn Iterator<Item = u32>| -> Vec<u32> {
+        let mut met: Vec<u32> =
+            controls.map(|v| block_of[v as usize]).filter(|&b| b != u32::MAX).collect();
+        met.sort_unstable();
+        met.dedup();
+        met
+    };
+    let patches = groups.iter().flat_map(|g| g.controls.chunks(g.per_patch));
+    let coupled = patches.map(|controls| clique(&mut controls.iter().copied()));
+    let pulled = pulls.iter().map(|p| clique(&mut p.stencil.iter().map(|&(v, _)| v)));
+    let coarse = SymmetricPattern::from_cliques(blocks.len(), coupled.chain(pulled));
+    let mut place = vec![0; freedom.len()];
+    let mut next = 0;
+    for block in SparseCholesky::elimination_order(&coarse)? {
+        let (start, dim) = blocks[block];
+        for unknown in &mut place[start..start + dim] {
+            *unknown = next;
+            next += 1;
+        }
+    }
+    let unknowns = |block: usize| {
+        let (start, dim) = blocks[block];
+        (0..dim).map(move |k| start + k)
+    };
+    let entries = (0..blocks.len()).flat_map(|b| {
+        let rows = &coarse.rows()[coarse.column_starts()[b]..coarse.column_starts()[b + 1]];
+        rows.iter().flat_map(move |&a| {
+            unknowns(a as usize).flat_map(move |i| unknowns(b).map(move |j| (i, j)))
+        })
+    });
+    let placed = entries.map(|(i, j)| (place[i] as usize, place[j] as usize));
+    let pattern = SymmetricPattern::new(freedom.len(), placed)?;
+    Ok((pattern, place))
+}
+
+// Ordered pairs of control points that have unknowns, the first one's not eliminated before the
+// second one's: the places of their first unknowns.
+fn for_pairs(
+    groups: &[Group],
+    freedom: &Freedom,
+    place: &[u32],
+    mut visit: impl FnMut(usize, usize),
+) {
+    let first = |v: u32| {
+        let v = v as usize;
+        (freedom.dim[v] > 0).then(|| place[freedom.start[v] as usize] as usize)
+    };
     for group in groups {
         for controls in group.controls.chunks(group.per_patch) {
-            for &a in controls {
-                for &b in controls {
-                    let (a, b) = (a as usize, b as usize);
-                    if freedom.dim[a] > 0
-                        && freedom.dim[b] > 0
-                        && freedom.start[a] >= freedom.start[b]
-                    {
+            for a in controls.iter().filter_map(|&a| first(a)) {
+                for b in controls.iter().filter_map(|&b| first(b)) {
+                    if a >= b {
                         visit(a, b);
                     }
                 }

@@ -450,7 +450,7 @@ impl<'a> System<'a> {
         let mut columns = |pattern: &SymmetricPattern| {
             for j in 0..n {
                 for k in pattern.column_starts()[j]..pattern.column_starts()[j + 1] {
-                    put(pattern.rows()[k], j, self.matrix[k]);
+                    put(pattern.rows()[k] as usize, j, self.matrix[k]);
                 }
             }
         };

@@ -65,7 +65,7 @@ impl Graph {
         for (a, range) in rows.iter().enumerate() {
             let starts = pattern.column_starts();
             for &i in &pattern.rows()[starts[range.start]..starts[range.end]] {
-                let b = number[i] as usize;
+                let b = number[i as usize] as usize;
                 if b != a && last[b] != a as u32 {
                     last[b] = a as u32;
                     lists[a].push(b as u32);
@@ -246,6 +246,7 @@ mod tests {
         };
         for j in 0..pattern.size() {
             for &i in &pattern.rows()[pattern.column_starts()[j]..pattern.column_starts()[j + 1]] {
+                let i = i as usize;
                 let (a, b) = (part_of[i].min(part_of[j]), part_of[i].max(part_of[j]));
                 assert!(above(a, b), "rows {i} and {j} meet outside a separator");
             }

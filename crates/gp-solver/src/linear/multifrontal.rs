@@ -137,7 +137,7 @@ impl MultifrontalCholesky {
         let columns = pattern.column_starts();
         for j in 0..order.len() {
             for &i in &pattern.rows()[columns[j]..columns[j + 1]] {
-                starts[places(j, i).0 + 1] += 1;
+                starts[places(j, i as usize).0 + 1] += 1;
             }
         }
         for k in 0..order.len() {
@@ -147,7 +147,7 @@ impl MultifrontalCholesky {
         let mut next = starts.clone();
         for j in 0..order.len() {
             for entry in columns[j]..columns[j + 1] {
-                let (low, high) = places(j, pattern.rows()[entry]);
+                let (low, high) = places(j, pattern.rows()[entry] as usize);
                 by_column[next[low]] = (entry as u32, high);
                 next[low] += 1;
             }

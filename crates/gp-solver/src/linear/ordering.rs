@@ -9,6 +9,7 @@ pub(crate) fn reverse_cuthill_mckee(pattern: &SymmetricPattern) -> Vec<usize> {
     let mut neighbours = vec![Vec::new(); n];
     for j in 0..n {
         for &i in &pattern.rows()[pattern.column_starts()[j] + 1..pattern.column_starts()[j + 1]] {
+            let i = i as usize;
             neighbours[i].push(j);
             neighbours[j].push(i);
         }
@@ -79,7 +80,7 @@ pub(crate) fn half_bandwidth(pattern: &SymmetricPattern, position: &[usize]) -> 
     let mut kd = 0;
     for j in 0..pattern.size() {
         for &i in &pattern.rows()[pattern.column_starts()[j]..pattern.column_starts()[j + 1]] {
-            kd = kd.max(position[i].abs_diff(position[j]));
+            kd = kd.max(position[i as usize].abs_diff(position[j]));
         }
     }
     kd

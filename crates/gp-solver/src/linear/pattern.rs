@@ -7,7 +7,7 @@ use crate::error::SolverError;
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct SymmetricPattern {
     column_starts: Vec<usize>,
-    rows: Vec<usize>,
+    rows: Vec<u32>,
 }
 
 impl SymmetricPattern {
@@ -16,17 +16,21 @@ impl SymmetricPattern {
     ///
     /// # Errors
     /// [`SolverError::EntryOutOfRange`].
+    ///
+    /// # Panics
+    /// If `size` needs more than 32 bits.
     pub fn new(
         size: usize,
         entries: impl IntoIterator<Item = (usize, usize)>,
     ) -> Result<Self, SolverError> {
-        let mut columns: Vec<Vec<usize>> = (0..size).map(|j| vec![j]).collect();
+        let rows = u32::try_from(size).expect("fewer than 2³² rows");
+        let mut columns: Vec<Vec<u32>> = (0..rows).map(|j| vec![j]).collect();
         for (row, column) in entries {
             if row >= size || column >= size {
                 return Err(SolverError::EntryOutOfRange { row, column, size });
             }
             if row != column {
-                columns[row.min(column)].push(row.max(column));
+                columns[row.min(column)].push(row.max(column) as u32);
             }
         }
         let mut pattern = Self { column_starts: vec![0], rows: Vec::new() };
@@ -35,14 +39,21 @@ impl SymmetricPattern {
             column.dedup();
             pattern.rows.extend_from_slice(column);
             pattern.column_starts.push(pattern.rows.len());
+            *column = Vec::new();
         }
+        pattern.rows.shrink_to_fit();
         Ok(pattern)
     }
 
     /// Pattern in which each group's members are pairwise coupled.
-    pub(crate) fn from_cliques<'a>(size: usize, groups: impl Iterator<Item = &'a [u32]>) -> Self {
+    ///
+    /// # Panics
+    /// If a group is not sorted or names a row out of range.
+    pub fn from_cliques<G: AsRef<[u32]>>(size: usize, groups: impl Iterator<Item = G>) -> Self {
         let mut columns: Vec<Vec<u32>> = (0..size as u32).map(|j| vec![j]).collect();
         for group in groups {
+            let group = group.as_ref();
+            assert!(group.is_sorted(), "a group is sorted");
             for (k, &j) in group.iter().enumerate() {
                 let column = &mut columns[j as usize];
                 column.extend_from_slice(&group[k..]);
@@ -57,7 +68,7 @@ impl SymmetricPattern {
         for mut column in columns {
             column.sort_unstable();
             column.dedup();
-            pattern.rows.extend(column.iter().map(|&i| i as usize));
+            pattern.rows.extend_from_slice(&column);
             pattern.column_starts.push(pattern.rows.len());
         }
         pattern
@@ -89,7 +100,7 @@ impl SymmetricPattern {
 
     /// Row of every stored entry.
     #[must_use]
-    pub fn rows(&self) -> &[usize] {
+    pub fn rows(&self) -> &[u32] {
         &self.rows
     }
 
@@ -99,7 +110,7 @@ impl SymmetricPattern {
         let (i, j) = (row.max(column), row.min(column));
         let start = *self.column_starts.get(j)?;
         let end = *self.column_starts.get(j + 1)?;
-        self.rows[start..end].binary_search(&i).ok().map(|k| start + k)
+        self.rows[start..end].binary_search(&(i as u32)).ok().map(|k| start + k)
     }
 
     /// `out = A x` for the matrix with these stored values.
@@ -114,7 +125,7 @@ impl SymmetricPattern {
             let start = self.column_starts[j];
             out[j] += values[start] * x[j];
             for k in start + 1..self.column_starts[j + 1] {
-                let i = self.rows[k];
+                let i = self.rows[k] as usize;
                 out[i] += values[k] * x[j];
                 out[j] += values[k] * x[i];
             }
