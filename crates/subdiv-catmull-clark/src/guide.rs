@@ -1,7 +1,7 @@
 //! The polynomial that stands in for the surface near an extraordinary vertex.
 
 use crate::blend::{septic_step, weight_jet};
-use crate::jet::{JET_LEN, Jet, JetWeights, jet_index, jet_product};
+use crate::jet::{JET_LEN, Jet, JetWeights, cubic_basis, jet_index, jet_product, separable_jet};
 use std::f64::consts::TAU;
 
 /// Total degree of the guide.
@@ -19,17 +19,19 @@ const GAUSS_6: [(f64, f64); 6] = [
     (0.966_234_757_101_576, 0.085_662_246_189_585_17),
 ];
 
-/// Coefficients of the guide as linear functions of the two-ring of an extraordinary vertex.
+/// The surface near an extraordinary vertex as a linear function of its two-ring.
 ///
-/// The guide `q` is the polynomial of degree five in the characteristic coordinates `(ξ, η)` that
-/// minimises `Σ ∫ |∇³ S|² dξ dη` over the patches around the vertex, with
-/// `S = (1 − w) S_CC + w q` and `w` the septic step over the whole ring. As the energy measures
-/// just the third derivatives, this keeps the ripples out of the blend that a guide fitted to
-/// positions leaves, and `q` may have any curvature at the vertex.
+/// `S = (1 − w) (S_CC + Σ d N) + w q` on the patches around the vertex, with `w` the septic step over
+/// the whole ring. The guide `q` is a polynomial of degree five in the characteristic coordinates
+/// `(ξ, η)`. `N` are the basis functions of the twice refined mesh that leave the ring's outer
+/// boundary alone; they repair the Catmull-Clark surface where it fades out, which cannot hold a
+/// quadratic. The coefficients of `q` and the `d` minimise `Σ ∫ |∇³ S|² dξ dη`. As that measures just
+/// the third derivatives, no ripples are left in the blend, and `q` may have any curvature.
 #[derive(Clone, Debug)]
 pub(crate) struct Guide {
     valence: usize,
-    /// `MONOMIALS × points()`, row-major.
+    /// `(MONOMIALS + points()) × points()`, row-major: the polynomial's coefficients, then the `d`
+    /// in the order of the two-ring.
     coefficients: Vec<f64>,
 }
 
@@ -56,6 +58,59 @@ pub(crate) fn two_ring_columns(n: usize, j: usize) -> Vec<usize> {
     columns
 }
 
+/// Position among the `2n + 8` control points around an extraordinary vertex of the one at `(i, j)`
+/// of sector 0's grid, the vertex itself at `(0, 0)`; `None` outside of the two-ring.
+fn grid_position(n: usize, i: isize, j: isize) -> Option<usize> {
+    Some(match (i, j) {
+        (0, 0) => 0,
+        (1, 0) => 1,
+        (1, 1) => 2,
+        (0, 1) => 3,
+        (-1, 1) => 4,
+        (-1, 0) => 1 + 4 % (2 * n),
+        (0, -1) => 2 * n - 1,
+        (1, -1) => 2 * n,
+        (2, -1) => 2 * n + 1,
+        (2, 0) => 2 * n + 2,
+        (2, 1) => 2 * n + 3,
+        (2, 2) => 2 * n + 4,
+        (1, 2) => 2 * n + 5,
+        (0, 2) => 2 * n + 6,
+        (-1, 2) => 2 * n + 7,
+        _ => return None,
+    })
+}
+
+/// Jets at `(u, v)` in sector 0 of the basis functions of the twice refined mesh's `2n + 8` vertices
+/// around the extraordinary one.
+fn repair_weights(
+    n: usize,
+    weights: &impl Fn(f64, f64) -> JetWeights,
+    u: f64,
+    v: f64,
+) -> JetWeights {
+    let cells = CELLS as f64;
+    let (a, b) = ((cells * u).min(cells - 1.0).floor(), (cells * v).min(cells - 1.0).floor());
+    let (s, t) = (cells * u - a, cells * v - b);
+    let mut out = if a + b == 0.0 {
+        weights(s, t)
+    } else {
+        let (along, across) = (cubic_basis(s), cubic_basis(t));
+        let mut out = JetWeights::zeros(2 * n + 8);
+        for (i, j) in (0..16).map(|k| (k / 4, k % 4)) {
+            let place = grid_position(n, a as isize + i as isize - 1, b as isize + j as isize - 1);
+            if let Some(place) = place {
+                let [f, g] =
+                    [(&along, i), (&across, j)].map(|(b, k)| std::array::from_fn(|d| b[d][k]));
+                out.set_jet(place, &separable_jet(&f, &g));
+            }
+        }
+        out
+    };
+    out.rescale(cells);
+    out
+}
+
 impl Guide {
     /// Fits the guide of valence `n`: `weights` evaluates the Catmull-Clark patch, `map` is the
     /// characteristic map on its control points.
@@ -65,7 +120,8 @@ impl Guide {
         weights: impl Fn(f64, f64) -> JetWeights,
     ) -> Self {
         let count = 2 * n + 8;
-        let width = MONOMIALS + count;
+        let local = MONOMIALS + count;
+        let width = local + count;
         let mut rows = Vec::new();
         for cell in 0..CELLS * CELLS {
             let corner = [cell / CELLS, cell % CELLS].map(|c| c as f64 / CELLS as f64);
@@ -74,38 +130,44 @@ impl Guide {
                     let u = corner[0] + x / CELLS as f64;
                     let v = corner[1] + y / CELLS as f64;
                     let measure = wx * wy / (CELLS * CELLS) as f64;
-                    sample_rows(&weights(u, v), map, u, v, measure, &mut rows);
+                    let repair = repair_weights(n, &weights, u, v);
+                    sample_rows(&weights(u, v), &repair, map, u, v, measure, &mut rows);
                 }
             }
         }
         // The other sectors see the same integrals in rotated coordinates: reduce one sector to a
         // triangle, then stack its rotated copies.
-        householder(&mut rows, width, MONOMIALS);
+        householder(&mut rows, width, local);
         let points = 6 * n + 1;
-        let wide = MONOMIALS + points;
-        let mut stacked = Vec::with_capacity(n * MONOMIALS * wide);
+        let unknowns = MONOMIALS + points;
+        let wide = unknowns + points;
+        let mut stacked = Vec::with_capacity(n * local * wide);
         for j in 0..n {
             let rotation = rotated_monomials(TAU * j as f64 / n as f64);
             let columns = two_ring_columns(n, j);
-            for i in 0..MONOMIALS {
+            for i in 0..local {
                 let source = &rows[i * width..(i + 1) * width];
                 let mut row = vec![0.0; wide];
                 for (k, out) in row[..MONOMIALS].iter_mut().enumerate() {
                     let turned = &rotation[k * MONOMIALS..(k + 1) * MONOMIALS];
                     *out = (i..MONOMIALS).map(|m| source[m] * turned[m]).sum();
                 }
-                for (&c, &value) in columns.iter().zip(&source[MONOMIALS..]) {
-                    row[MONOMIALS + c] += value;
+                // Below the diagonal the reduced rows hold what is left of the reflections.
+                for (k, &c) in columns.iter().enumerate() {
+                    if MONOMIALS + k >= i {
+                        row[MONOMIALS + c] += source[MONOMIALS + k];
+                    }
+                    row[unknowns + c] += source[local + k];
                 }
                 stacked.extend(row);
             }
         }
-        householder(&mut stacked, wide, MONOMIALS);
-        let mut coefficients = vec![0.0; MONOMIALS * points];
-        for i in (0..MONOMIALS).rev() {
+        householder(&mut stacked, wide, unknowns);
+        let mut coefficients = vec![0.0; unknowns * points];
+        for i in (0..unknowns).rev() {
             for c in 0..points {
-                let mut value = -stacked[i * wide + MONOMIALS + c];
-                for k in i + 1..MONOMIALS {
+                let mut value = -stacked[i * wide + unknowns + c];
+                for k in i + 1..unknowns {
                     value -= stacked[i * wide + k] * coefficients[k * points + c];
                 }
                 coefficients[i * points + c] = value / stacked[i * wide + i];
@@ -119,27 +181,49 @@ impl Guide {
         6 * self.valence + 1
     }
 
-    /// Weights of the blended patch of sector 0 from those of the Catmull-Clark patch.
-    pub(crate) fn blend(&self, plain: &JetWeights, map: &[[f64; 2]], u: f64, v: f64) -> JetWeights {
-        let monomials = monomial_jets(&coordinate_jets(plain, map));
+    /// Jets at `(u, v)` of the control points' weights on the blended patch of sector 0; `weights`
+    /// evaluates the Catmull-Clark patch.
+    pub(crate) fn blend(
+        &self,
+        weights: impl Fn(f64, f64) -> JetWeights,
+        map: &[[f64; 2]],
+        u: f64,
+        v: f64,
+    ) -> JetWeights {
+        let plain = weights(u, v);
+        let repair = repair_weights(self.valence, &weights, u, v);
         let fade = weight_jet(septic_step, u, v);
+        let mut rest = fade.map(|x| -x);
+        rest[0] += 1.0;
         let columns = two_ring_columns(self.valence, 0);
         let points = self.points();
+        // What every coefficient adds.
+        let mut terms: Vec<(usize, Jet)> = monomial_jets(&coordinate_jets(&plain, map))
+            .iter()
+            .map(|m| jet_product(&fade, m))
+            .enumerate()
+            .collect();
+        terms.extend(
+            columns
+                .iter()
+                .enumerate()
+                .map(|(k, &c)| (MONOMIALS + c, jet_product(&rest, &repair.jet(k)))),
+        );
         let mut wide = vec![[0.0; JET_LEN]; points];
         for (k, &c) in columns.iter().enumerate() {
-            wide[c] = plain.jet(k);
+            wide[c] = jet_product(&rest, &plain.jet(k));
+        }
+        for (row, term) in &terms {
+            let row = &self.coefficients[row * points..(row + 1) * points];
+            for (jet, coefficient) in wide.iter_mut().zip(row) {
+                for d in 0..JET_LEN {
+                    jet[d] += coefficient * term[d];
+                }
+            }
         }
         let mut out = JetWeights::zeros(points);
         for (c, jet) in wide.iter().enumerate() {
-            let mut difference: Jet = jet.map(|x| -x);
-            for (k, monomial) in monomials.iter().enumerate() {
-                let coefficient = self.coefficients[k * points + c];
-                for d in 0..JET_LEN {
-                    difference[d] += coefficient * monomial[d];
-                }
-            }
-            let correction = jet_product(&fade, &difference);
-            out.set_jet(c, &std::array::from_fn(|d| jet[d] + correction[d]));
+            out.set_jet(c, jet);
         }
         out
     }
@@ -166,9 +250,10 @@ fn monomial_jets(coordinates: &[Jet; 2]) -> [Jet; MONOMIALS] {
 }
 
 /// The four weighted third derivatives by `(ξ, η)` at one sample: of `w` times each monomial, then
-/// of `1 − w` times each control point's weight.
+/// of `1 − w` times each repair and each control point's weight.
 fn sample_rows(
     plain: &JetWeights,
+    repair: &JetWeights,
     map: &[[f64; 2]],
     u: f64,
     v: f64,
@@ -195,7 +280,9 @@ fn sample_rows(
     rest[0] += 1.0;
     let mut columns: Vec<Jet> =
         monomial_jets(&coordinates).iter().map(|m| jet_product(&fade, m)).collect();
-    columns.extend((0..plain.control_points()).map(|k| jet_product(&rest, &plain.jet(k))));
+    for weights in [repair, plain] {
+        columns.extend((0..weights.control_points()).map(|k| jet_product(&rest, &weights.jet(k))));
+    }
     solve_jets(&mut system, &mut columns);
     // |∇³f|² = f_xxx² + 3 f_xxy² + 3 f_xyy² + f_yyy², with f_xxx = 6 c₃₀ and f_xxy = 2 c₂₁.
     let factors = [6.0, 12.0_f64.sqrt(), 12.0_f64.sqrt(), 6.0];

@@ -157,7 +157,7 @@ impl SubdivisionSurface {
         match &self.bases[basis.0] {
             Basis::Plain { class } => self.classes.weights(*class, u, v),
             Basis::Guided { class, map, guide } => {
-                guide.blend(&self.classes.weights(*class, u, v), map, u, v)
+                guide.blend(|u, v| self.classes.weights(*class, u, v), map, u, v)
             }
             Basis::Flat { class, map, valence } => {
                 flat_weights(&self.classes.weights(*class, u, v), map, *valence, u, v)

@@ -107,7 +107,7 @@ fn regular_patch_is_the_b_spline() {
 
 #[test]
 fn every_valence_matches_differences_and_refinement() {
-    for n in [3, 5, 6, 7, 8, 13, 20] {
+    for n in [3, 5, 6, 7, 8, 12, 13, 20] {
         let mesh = star(n, 4);
         for blend in [Blend::None, Blend::Smooth, Blend::Flat] {
             let surface = SubdivisionSurface::new(&mesh, &Creases::none(), blend).unwrap();
@@ -136,31 +136,53 @@ fn every_valence_matches_differences_and_refinement() {
     }
 }
 
+/// Point, unit normal, mean and Gaussian curvature.
+fn shape(jet: &[DVec3; 15]) -> (DVec3, DVec3, f64, f64) {
+    let normal = jet[1].cross(jet[2]).normalize();
+    let (e, f, g) = (jet[1].dot(jet[1]), jet[1].dot(jet[2]), jet[2].dot(jet[2]));
+    let (l, m, q) = (jet[3].dot(normal), jet[4].dot(normal), jet[5].dot(normal));
+    let d = e * g - f * f;
+    (jet[0], normal, (l * g - 2.0 * m * f + q * e) / (2.0 * d), (l * q - m * m) / d)
+}
+
 #[test]
-fn blended_surface_is_twice_continuous_across_sectors() {
-    for n in [3, 5, 6, 8] {
+fn blended_surface_is_twice_continuous() {
+    for n in [3, 5, 6, 8, 12, 20] {
         let mesh = star(n, 4);
         let surface = SubdivisionSurface::new(&mesh, &Creases::none(), Blend::Smooth).unwrap();
+        let at = |patch: &Patch, u, v| {
+            shape(&surface.evaluate(mesh.positions(), patch, u, v).derivatives)
+        };
+        let check = |a: (DVec3, DVec3, f64, f64), b: (DVec3, DVec3, f64, f64), what: &str| {
+            assert!(a.0.distance(b.0) < 1e-11, "valence {n}, {what}: points");
+            assert!(a.1.distance(b.1) < 1e-9, "valence {n}, {what}: normals");
+            let scale = 1.0 + a.2 * a.2 + a.3.abs();
+            let gap = (a.2 - b.2).abs().max((a.3 - b.3).abs());
+            assert!(gap < 1e-8 * scale, "valence {n}, {what}: curvatures differ by {gap}");
+        };
         let around: Vec<&Patch> =
             surface.patches().iter().filter(|p| mesh.origin(p.corner) == VertexId(0)).collect();
+        assert_eq!(around.len(), n as usize);
         for patch in &around {
             let next_corner = mesh.twin(mesh.prev(patch.corner));
             let next = around.iter().find(|p| p.corner == next_corner).unwrap();
-            for t in [0.05, 0.4, 0.9] {
+            // The ring's outer boundary: the edge u = 1 is an edge of a regular patch.
+            let across = mesh.twin(mesh.next(patch.corner));
+            let outer =
+                surface.patches().iter().find(|p| p.face == mesh.face(across).unwrap()).unwrap();
+            let mut turns = 0;
+            let mut h = outer.corner;
+            while h != across {
+                h = mesh.next(h);
+                turns += 1;
+            }
+            for t in [0.05, 0.25, 0.4, 0.9] {
                 // The edge u = 0 of one patch is the edge v = 0 of the next one.
-                let a = surface.evaluate(mesh.positions(), patch, 0.0, t).derivatives;
-                let b = surface.evaluate(mesh.positions(), next, t, 0.0).derivatives;
-                assert!(a[0].distance(b[0]) < 1e-12);
-                let normal = a[1].cross(a[2]).normalize();
-                assert!(normal.distance(b[1].cross(b[2]).normalize()) < 1e-10);
-                let shape = |j: &[DVec3; 15]| {
-                    let (e, f, g) = (j[1].dot(j[1]), j[1].dot(j[2]), j[2].dot(j[2]));
-                    let (l, m, q) = (j[3].dot(normal), j[4].dot(normal), j[5].dot(normal));
-                    let d = e * g - f * f;
-                    ((l * g - 2.0 * m * f + q * e) / (2.0 * d), (l * q - m * m) / d)
-                };
-                let ((ha, ka), (hb, kb)) = (shape(&a), shape(&b));
-                assert!((ha - hb).abs() < 1e-9 && (ka - kb).abs() < 1e-9, "valence {n}, t {t}");
+                check(at(patch, 0.0, t), at(next, t, 0.0), "between sectors");
+                // Along the half-edge of the outer patch the parameter runs the other way.
+                let s = 1.0 - t;
+                let (u, v) = [(s, 0.0), (1.0, s), (1.0 - s, 1.0), (0.0, 1.0 - s)][turns];
+                check(at(patch, 1.0, t), at(outer, u, v), "at the outer boundary");
             }
         }
     }
