@@ -177,7 +177,8 @@ const LEAST_CANDIDATES: usize = 2000;
 const HALVINGS: usize = 24;
 
 /// Greedy covering: the shapes of some panels become molds such that every panel is within a
-/// tolerance of one, and the tolerance is the smallest for which `count` suffice.
+/// tolerance of one, and the tolerance is the smallest for which `count` suffice. Molds that are
+/// left go to the panels that are worst off.
 pub(crate) fn cover(features: &[Feature], count: usize) -> Clusters {
     let wanted = LEAST_CANDIDATES.max(CANDIDATES_PER_MOLD * count);
     let step = features.len().div_ceil(wanted).max(1);
@@ -186,7 +187,7 @@ pub(crate) fn cover(features: &[Feature], count: usize) -> Clusters {
     // differ by rounding.
     let square = |x: &Feature| x.iter().map(|v| v * v).sum::<f64>();
     let rounding = 1e-13 * features.iter().map(square).fold(f64::MIN_POSITIVE, f64::max);
-    let mut high = spread_radius(features, count).max(rounding);
+    let mut high = spread(features, vec![features[0]], count, rounding).1.max(rounding);
     let (reached, mut chosen) = loop {
         let reached = reached_by(features, &candidates, high);
         if let Some(chosen) = greedy_cover(&reached, features.len(), count, high) {
@@ -202,7 +203,8 @@ pub(crate) fn cover(features: &[Feature], count: usize) -> Clusters {
             None => low = middle,
         }
     }
-    let centers: Vec<Feature> = chosen.iter().map(|&c| candidates[c]).collect();
+    let centers = chosen.iter().map(|&c| candidates[c]).collect();
+    let (centers, _) = spread(features, centers, count, rounding);
     let mut nearest = assign(features, &centers);
     fill_empty(&mut nearest, centers.len());
     Clusters {
@@ -225,22 +227,29 @@ fn reached_by(features: &[Feature], candidates: &[Feature], limit: f64) -> Vec<R
     candidates.par_iter().map(near).collect()
 }
 
-/// How far the shapes are from the nearest of `count` of them, each the furthest from those before.
-fn spread_radius(features: &[Feature], count: usize) -> f64 {
-    let mut distances = vec![f64::INFINITY; features.len()];
-    let mut next = 0;
-    let mut radius = 0.0;
-    for _ in 0..count {
-        let center = features[next];
+/// Adds centers, each the shape furthest from those before, until there are `count` or no shape is
+/// further than `enough`; the second value is how far the furthest shape is then.
+fn spread(
+    features: &[Feature],
+    mut centers: Vec<Feature>,
+    count: usize,
+    enough: f64,
+) -> (Vec<Feature>, f64) {
+    let mut distances: Vec<f64> = assign(features, &centers).iter().map(|x| x.1).collect();
+    loop {
+        let further = |a: usize, b: usize| if distances[b] > distances[a] { b } else { a };
+        let furthest = (0..distances.len()).fold(0, further);
+        if centers.len() >= count || distances[furthest] <= enough {
+            return (centers, distances[furthest]);
+        }
+        let center = features[furthest];
         distances
             .par_iter_mut()
             .with_min_len(2048)
             .zip(features)
             .for_each(|(d, x)| *d = d.min(distance(x, &center).0));
-        next = (0..distances.len()).fold(0, |a, b| if distances[b] > distances[a] { b } else { a });
-        radius = distances[next];
+        centers.push(center);
     }
-    radius
 }
 
 /// The candidates that cover all `shapes` shapes within the tolerance, each the one that covers

@@ -102,6 +102,7 @@ impl Fit {
         let mut history = Vec::new();
         let mut joint = vec![Some(FIRST_DAMPING); self.molds.len()];
         for round in 0..rounds {
+            self.center_tori(set);
             if round < ALTERNATING {
                 self.refit_molds(set);
                 self.register(set);
@@ -147,6 +148,37 @@ impl Fit {
             }
             if after > (1.0 - MOLD_STALL) * before {
                 damping[m] = None;
+            }
+        }
+    }
+
+    /// Moves the origins of tori into the middle of their panels where that lowers the energy: the
+    /// surface stays, heights and slopes are measured in a better direction.
+    fn center_tori(&mut self, set: &PanelSet) {
+        let tori = (0..self.molds.len())
+            .into_par_iter()
+            .filter(|&m| self.molds[m].kind == MoldType::Torus);
+        let centered: Vec<_> = tori
+            .filter_map(|m| {
+                let members = &self.members[m];
+                let (mold, poses) =
+                    torus_start::centered(set, members, &self.poses, &self.molds[m])?;
+                let energy = |(&p, pose): (&usize, &Pose)| {
+                    let (points, normals) = set.panel_samples(p);
+                    panel_energy(&mold, self.slope_weight, pose, points, normals)
+                };
+                let energies: Vec<f64> = members.iter().zip(&poses).map(energy).collect();
+                let before: f64 = members.iter().map(|&p| self.energies[p]).sum();
+                // A panel beyond the reach of the torus has no energy; any number is better.
+                let is_better = energies.iter().sum::<f64>() <= before || before.is_nan();
+                is_better.then_some((m, mold, poses, energies))
+            })
+            .collect();
+        for (m, mold, poses, energies) in centered {
+            self.molds[m] = mold;
+            for ((&p, pose), energy) in self.members[m].iter().zip(poses).zip(energies) {
+                self.poses[p] = pose;
+                self.energies[p] = energy;
             }
         }
     }

@@ -171,8 +171,16 @@ impl Mold {
                     fyy: 2.0 * c + 2.0 * g * x + 6.0 * h * y,
                 }
             }
-            MoldType::Torus => self.torus(x, y).map_or(UNREACHED, Height::of),
-            MoldType::Cylinder | MoldType::Sphere => Height::of(self.round(x, y)),
+            MoldType::Torus => self.torus_height(x, y).map_or(UNREACHED, |z| {
+                let [k1, k2, g, ..] = self.parameters.map(Taylor::constant);
+                let [x, y, z] = variables([x, y, z]);
+                Height::of(explicit::<3, 2>(z.value, torus_equation(x, y, [k1, k2, g], z)))
+            }),
+            MoldType::Cylinder | MoldType::Sphere => {
+                let [k1, k2] = self.round_curvatures().map(Taylor::constant);
+                let [x, y] = variables([x, y]);
+                Height::of::<2>(round_height(x, y, k1, k2))
+            }
         }
     }
 
@@ -192,7 +200,7 @@ impl Mold {
                 rows[1] = [2.0 * x, y, 0.0, 3.0 * xx, 2.0 * xy, yy, 0.0];
                 rows[2] = [0.0, x, 2.0 * y, 0.0, xx, 2.0 * xy, 3.0 * yy];
             }
-            MoldType::Torus => match self.torus(x, y) {
+            MoldType::Torus => match self.torus_rows(x, y) {
                 Some(z) => {
                     for i in 0..3 {
                         rows[0][i] = z.first[2 + i];
@@ -203,7 +211,9 @@ impl Mold {
                 None => rows.iter_mut().for_each(|row| row[..3].fill(f64::NAN)),
             },
             MoldType::Cylinder | MoldType::Sphere => {
-                let z = self.round(x, y);
+                let [k1, k2] = self.round_curvatures();
+                let [x, y, k1, k2] = variables([x, y, k1, k2]);
+                let z = round_height(x, y, k1, k2);
                 for (row, [along_x, along_y]) in rows.iter_mut().zip([
                     [z.first[2], z.first[3]],
                     [z.second[0][2], z.second[0][3]],
@@ -217,33 +227,20 @@ impl Mold {
         rows
     }
 
-    /// The height of a cylinder or sphere as a function of x, y and two curvatures, which are those
-    /// of the parallel and of the generating circle of a torus at its equator.
-    ///
-    /// The generating circle has the height `p = k₂ y² / (1 + √(1 − k₂² y²))`; turning it about
-    /// the axis at height `1/k₁` gives `z = q / (1 + √(1 − k₁ q))` with
-    /// `q = 2 p + k₁ (x² − p²)`, which stays exact where a curvature vanishes (a cylinder) and is
-    /// a sphere for equal curvatures.
-    fn round(&self, x: f64, y: f64) -> Taylor<4> {
-        let k1 = self.parameters[0];
-        let k2 = if self.kind == MoldType::Sphere { k1 } else { 0.0 };
-        let [x, y, k1, k2] =
-            [(x, 0), (y, 1), (k1, 2), (k2, 3)].map(|(v, i)| Taylor::variable(v, i));
-        let one = Taylor::constant(1.0);
-        let p = k2.mul(y).mul(y).div(one.add(one.sub(k2.mul(k2).mul(y).mul(y)).sqrt()));
-        let q = p.add(p).add(k1.mul(x.mul(x).sub(p.mul(p))));
-        q.div(one.add(one.sub(k1.mul(q)).sqrt()))
+    /// Curvatures of a cylinder or sphere along x and y.
+    fn round_curvatures(&self) -> [f64; 2] {
+        let k = self.parameters[0];
+        [k, if self.kind == MoldType::Sphere { k } else { 0.0 }]
     }
 
-    /// The torus height as a function of x, y and the three parameters `k₁, k₂, g`; `None` beyond
-    /// its reach.
+    /// The height of a torus; `None` beyond its reach.
     ///
     /// Turning `(x, y, z)` about the axis into the plane `x = 0` gives `(y + g d, z + k₁ d)` with
     /// `d = −x² / (1 − σ + √((k₁² + g²) x² + (1 − σ)²))` and `σ = g y + k₁ z`, which stays exact as
     /// the axis moves to infinity. There the generating circle has the height
     /// `p(t) = k₂ t² / (1 + √(1 − k₂² t²))`, so the height is the root of
     /// `z + k₁ d − p(y + g d)`.
-    fn torus(&self, x: f64, y: f64) -> Option<Taylor<5>> {
+    fn torus_height(&self, x: f64, y: f64) -> Option<f64> {
         let [k1, k2, g, ..] = self.parameters;
         let squared = k1 * k1 + g * g;
         let mut z = 0.5 * (k1 * x * x + k2 * y * y);
@@ -271,36 +268,76 @@ impl Mold {
             // The step after a small one only removes rounding.
             is_root = step.abs() <= 1e-9 * scale;
         }
-        if !is_root {
-            return None;
-        }
-        let constants = [x, y, k1, k2, g, z];
-        let [x, y, k1, k2, g, z] = std::array::from_fn(|i| Taylor::<6>::variable(constants[i], i));
-        let one = Taylor::constant(1.0);
-        let below = one.sub(g.mul(y)).sub(k1.mul(z));
-        let xx = x.mul(x);
-        let w = xx.mul(k1.mul(k1).add(g.mul(g))).add(below.mul(below)).sqrt();
-        let d = Taylor::constant(0.0).sub(xx.div(below.add(w)));
-        let t = y.add(g.mul(d));
-        let tube = k2.mul(t);
-        let p = tube.mul(t).div(one.add(one.sub(tube.mul(tube)).sqrt()));
-        let implicit = z.add(k1.mul(d)).sub(p);
-        // Implicit differentiation of `implicit = 0` for z.
-        let (first, second) = (implicit.first, implicit.second);
-        let mut height = Taylor::<5>::constant(z.value);
-        for i in 0..5 {
-            height.first[i] = -first[i] / first[5];
-        }
-        for i in 0..5 {
-            for j in 0..5 {
-                let (fi, fj) = (height.first[i], height.first[j]);
-                let sum =
-                    second[i][j] + second[i][5] * fj + second[5][j] * fi + second[5][5] * fi * fj;
-                height.second[i][j] = -sum / first[5];
-            }
-        }
-        Some(height)
+        is_root.then_some(z)
     }
+
+    /// The torus height as a function of x, y and the three parameters `k₁, k₂, g`.
+    fn torus_rows(&self, x: f64, y: f64) -> Option<Taylor<5>> {
+        let z = self.torus_height(x, y)?;
+        let [k1, k2, g, ..] = self.parameters;
+        let [x, y, k1, k2, g, z] = variables([x, y, k1, k2, g, z]);
+        Some(explicit(z.value, torus_equation(x, y, [k1, k2, g], z)))
+    }
+}
+
+/// Each number as a variable of its own.
+fn variables<const N: usize>(values: [f64; N]) -> [Taylor<N>; N] {
+    std::array::from_fn(|i| Taylor::variable(values[i], i))
+}
+
+/// The height of a cylinder or sphere as a function of x, y and two curvatures, which are those
+/// of the parallel and of the generating circle of a torus at its equator.
+///
+/// The generating circle has the height `p = k₂ y² / (1 + √(1 − k₂² y²))`; turning it about
+/// the axis at height `1/k₁` gives `z = q / (1 + √(1 − k₁ q))` with
+/// `q = 2 p + k₁ (x² − p²)`, which stays exact where a curvature vanishes (a cylinder) and is
+/// a sphere for equal curvatures.
+fn round_height<const N: usize>(
+    x: Taylor<N>,
+    y: Taylor<N>,
+    k1: Taylor<N>,
+    k2: Taylor<N>,
+) -> Taylor<N> {
+    let one = Taylor::constant(1.0);
+    let p = k2.mul(y).mul(y).div(one.add(one.sub(k2.mul(k2).mul(y).mul(y)).sqrt()));
+    let q = p.add(p).add(k1.mul(x.mul(x).sub(p.mul(p))));
+    q.div(one.add(one.sub(k1.mul(q)).sqrt()))
+}
+
+/// What vanishes on the torus, see [`Mold::torus_height`].
+fn torus_equation<const N: usize>(
+    x: Taylor<N>,
+    y: Taylor<N>,
+    [k1, k2, g]: [Taylor<N>; 3],
+    z: Taylor<N>,
+) -> Taylor<N> {
+    let one = Taylor::constant(1.0);
+    let below = one.sub(g.mul(y)).sub(k1.mul(z));
+    let xx = x.mul(x);
+    let w = xx.mul(k1.mul(k1).add(g.mul(g))).add(below.mul(below)).sqrt();
+    let d = Taylor::constant(0.0).sub(xx.div(below.add(w)));
+    let t = y.add(g.mul(d));
+    let tube = k2.mul(t);
+    let p = tube.mul(t).div(one.add(one.sub(tube.mul(tube)).sqrt()));
+    z.add(k1.mul(d)).sub(p)
+}
+
+/// The last variable of an equation, of value `z`, as a function of the `M = N − 1` others, by
+/// implicit differentiation.
+fn explicit<const N: usize, const M: usize>(z: f64, equation: Taylor<N>) -> Taylor<M> {
+    let (first, second) = (equation.first, equation.second);
+    let mut height = Taylor::<M>::constant(z);
+    for i in 0..M {
+        height.first[i] = -first[i] / first[M];
+    }
+    for i in 0..M {
+        for j in 0..M {
+            let (fi, fj) = (height.first[i], height.first[j]);
+            let sum = second[i][j] + second[i][M] * fj + second[M][j] * fi + second[M][M] * fi * fj;
+            height.second[i][j] = -sum / first[M];
+        }
+    }
+    height
 }
 
 /// Beyond the reach of a round mold.

@@ -9,10 +9,12 @@ pub(crate) struct Taylor<const N: usize> {
 }
 
 impl<const N: usize> Taylor<N> {
+    #[inline]
     pub(crate) fn constant(value: f64) -> Self {
         Self { value, first: [0.0; N], second: [[0.0; N]; N] }
     }
 
+    #[inline]
     pub(crate) fn variable(value: f64, index: usize) -> Self {
         let mut made = Self::constant(value);
         made.first[index] = 1.0;
@@ -31,14 +33,17 @@ impl<const N: usize> Taylor<N> {
         out
     }
 
+    #[inline]
     pub(crate) fn add(self, other: Self) -> Self {
         self.zip(other, |a, b| a + b)
     }
 
+    #[inline]
     pub(crate) fn sub(self, other: Self) -> Self {
         self.zip(other, |a, b| a - b)
     }
 
+    #[inline]
     pub(crate) fn mul(self, other: Self) -> Self {
         let mut out = Self::constant(self.value * other.value);
         for i in 0..N {
@@ -65,11 +70,13 @@ impl<const N: usize> Taylor<N> {
         out
     }
 
+    #[inline]
     pub(crate) fn sqrt(self) -> Self {
         let root = self.value.sqrt();
         self.then(root, 0.5 / root, -0.25 / (root * self.value))
     }
 
+    #[inline]
     pub(crate) fn div(self, other: Self) -> Self {
         let r = 1.0 / other.value;
         self.mul(other.then(r, -r * r, 2.0 * r * r * r))

@@ -8,6 +8,7 @@
 use crate::clustering::best_cubic;
 use crate::mold::{Mold, MoldType};
 use crate::panels::{PanelSet, Pose};
+use crate::residuals::panel_energy;
 use glam::{DMat3, DVec3};
 
 /// Most of a geodesic curvature, in units of the panel size: where both principal curvatures
@@ -15,6 +16,8 @@ use glam::{DMat3, DVec3};
 const MOST_GEODESIC: f64 = 0.5;
 /// A panel does not slide further along the tube, in radians: the mold is a height function.
 const LONGEST_SLIDE: f64 = 1.2;
+/// Panels whose middle is nearer than this to the origin, in radians along the tube, stay there.
+const LEAST_TURN: f64 = 0.05;
 /// An axis this much further away than the tube is wide says nothing about the place on the tube.
 const FAR_AXIS: f64 = 1e-3;
 
@@ -55,12 +58,12 @@ impl Patch {
     }
 
     /// The frame moved along the generating circle to another latitude.
-    fn slid(&self, latitude: f64) -> Option<(Pose, f64)> {
+    fn slid(&self, latitude: f64) -> Option<Pose> {
         let turn = latitude - self.latitude();
         let turn = turn - std::f64::consts::TAU * (turn / std::f64::consts::TAU).round();
         let slides = self.k2 != 0.0 && self.k1.hypot(self.g) > FAR_AXIS * self.k2.abs();
         if !slides {
-            return Some((self.frame, 0.0));
+            return Some(self.frame);
         }
         if turn.abs() > LONGEST_SLIDE {
             return None;
@@ -68,13 +71,60 @@ impl Patch {
         let center = self.frame.to_world(DVec3::new(0.0, 0.0, 1.0 / self.k2));
         // About the local x axis; y moves on to where the latitude is larger.
         let rotation = self.frame.rotation * DMat3::from_rotation_x(turn);
-        Some((Pose { origin: center - rotation.z_axis / self.k2, rotation }, turn.abs()))
+        Some(Pose { origin: center - rotation.z_axis / self.k2, rotation })
     }
 }
 
 /// The frame with its axes exchanged: the old y axis comes first.
 pub(crate) fn quarter_turn(rotation: DMat3) -> DMat3 {
     DMat3::from_cols(rotation.y_axis, -rotation.x_axis, rotation.z_axis)
+}
+
+/// A torus as seen from further along its generating circle, and the frame there in the frame of
+/// the old one. `turn` is the angle at the middle of the tube, in radians.
+fn seen_from(mold: &Mold, turn: f64) -> (Mold, Pose) {
+    let [k1, k2, g, ..] = mold.parameters;
+    let (sin, cos) = turn.sin_cos();
+    let origin = DVec3::new(0.0, sin / k2, (1.0 - cos) / k2);
+    // `(g, k₁)` points from the origin to the axis in the plane x = 0 and is the inverse of the
+    // distance long.
+    let nearer = 1.0 - g * origin.y - k1 * origin.z;
+    let mut seen = *mold;
+    seen.parameters[0] = (k1 * cos - g * sin) / nearer;
+    seen.parameters[2] = (g * cos + k1 * sin) / nearer;
+    (seen, Pose { origin, rotation: DMat3::from_rotation_x(turn) })
+}
+
+/// The same torus with its origin in the middle of its panels, and their poses in that frame;
+/// `None` if they lie about there already.
+///
+/// A panel that has slid far along the tube is near the edge of the height function, where slopes
+/// are steep and steps are refused because they would leave it.
+pub(crate) fn centered(
+    set: &PanelSet,
+    panels: &[usize],
+    poses: &[Pose],
+    mold: &Mold,
+) -> Option<(Mold, Vec<Pose>)> {
+    let k2 = mold.parameters[1];
+    let angle = |&p: &usize| {
+        let (points, _) = set.panel_samples(p);
+        let middle = poses[p].to_local(points[points.len() - 1]);
+        (k2 * middle.y).atan2(1.0 - k2 * middle.z)
+    };
+    let angles = panels.iter().map(angle);
+    let low = angles.clone().fold(f64::INFINITY, f64::min);
+    let turn = 0.5 * (low + angles.fold(f64::NEG_INFINITY, f64::max));
+    // NaN and infinite angles are refused as well.
+    if !(turn.abs() > LEAST_TURN && turn.abs() < LONGEST_SLIDE) {
+        return None;
+    }
+    let (seen, frame) = seen_from(mold, turn);
+    let moved = panels.iter().map(|&p| {
+        let origin = poses[p].to_world(frame.origin);
+        Pose { origin, rotation: poses[p].rotation * frame.rotation }
+    });
+    Some((seen, moved.collect()))
 }
 
 /// A torus for these panels, and where they stand on it; `is_across` says which principal
@@ -97,19 +147,40 @@ pub(crate) fn start(
     let Some(model) = model else { return (mold, Vec::new()) };
     mold.parameters[..3].copy_from_slice(&[model.k1, model.k2, model.g]);
     let latitude = model.latitude();
-    let poses = patches.iter().map(|patch| {
-        let [here, turned] = [patch.slid(latitude), patch.turned().slid(latitude)];
-        match (here, turned) {
-            (Some(a), Some(b)) => {
-                if b.1 < a.1 {
-                    b.0
-                } else {
-                    a.0
-                }
-            }
-            (Some((pose, _)), None) | (None, Some((pose, _))) => pose,
-            (None, None) => patch.frame,
-        }
+    // Sliding a panel to the latitude of the model is right if its geodesic curvature is; where
+    // that is read off noise, the panel had better stay.
+    let poses = panels.iter().zip(&patches).map(|(&p, patch)| {
+        let (points, normals) = set.panel_samples(p);
+        let energy = |pose: &Pose| panel_energy(&mold, slope_weight, pose, points, normals);
+        let turned = patch.turned();
+        let slid = [patch, &turned].into_iter().filter_map(|patch| patch.slid(latitude));
+        let rated =
+            [patch.frame, turned.frame].into_iter().chain(slid).map(|pose| (energy(&pose), pose));
+        // A pose beyond the reach of the torus has no energy.
+        let best = rated.reduce(|a, b| if b.0 < a.0 || a.0.is_nan() { b } else { a });
+        best.map_or(patch.frame, |(_, pose)| pose)
     });
     (mold, poses.collect())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use geom_core::assert_close;
+
+    #[test]
+    fn a_torus_seen_from_elsewhere_is_the_same_surface() {
+        let mut mold = Mold::flat(MoldType::Torus);
+        for [k1, k2, g] in [[0.3, -0.8, 0.1], [-0.4, 0.7, -0.2], [0.0, 0.5, 0.25], [0.2, 0.9, 0.0]]
+        {
+            mold.parameters[..3].copy_from_slice(&[k1, k2, g]);
+            for turn in [0.4, -0.3] {
+                let (seen, frame) = seen_from(&mold, turn);
+                for (x, y) in [(0.0, 0.0), (0.2, 0.1), (-0.3, 0.2), (0.1, -0.25)] {
+                    let there = frame.to_world(DVec3::new(x, y, seen.height(x, y)));
+                    assert_close(mold.height(there.x, there.y), there.z, 1e-12);
+                }
+            }
+        }
+    }
 }
