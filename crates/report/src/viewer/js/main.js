@@ -251,12 +251,19 @@ function makeApp(data, stages, origin, gl, canvas) {
     for (const [x, y] of [[left, 0], [0, top]]) {
       const tried = { azimuth, elevation, distance: 1, target: [0, 0, 0] };
       const room = [Math.max(width - x, width / 3), Math.max(height - y, height / 3)];
-      fitCamera(tried, stages[app.state.stage].positions, room[0] / height, room[1] / height);
+      const points = stages[app.state.stage].positions;
+      fitCamera(tried, points, room[0] / height, room[1] / height);
       if (camera && camera.distance <= tried.distance) continue;
-      const perPixel = (2 * Math.tan(FIELD_OF_VIEW / 2) * tried.distance) / height;
       const { right, up } = cameraAxes(tried);
       const shift = add(scale(right, (room[0] - width) / 2), scale(up, (height - room[1]) / 2));
-      tried.target = add(tried.target, scale(shift, perPixel));
+      const middle = tried.target;
+      // Out of the middle of the view what is near is magnified beyond the room, so step back a little.
+      for (let k = 0; k < 12; k++) {
+        const perPixel = (2 * Math.tan(FIELD_OF_VIEW / 2) * tried.distance) / height;
+        tried.target = add(middle, scale(shift, perPixel));
+        if (widestReach(tried, points, width / height) < 0.97) break;
+        tried.distance *= 1.03;
+      }
       camera = tried;
     }
     Object.assign(app.state, { camera, view: name, seam: quiet ? app.state.seam : -1 });

@@ -68,6 +68,20 @@ function fitCamera(camera, points, wide, high) {
   camera.distance = distance || 1;
 }
 
+// How far from the middle of the view points are drawn at most; its borders are at 1.
+function widestReach(camera, points, aspect) {
+  const { right, up, back } = cameraAxes(camera);
+  const t = Math.tan(FIELD_OF_VIEW / 2);
+  const step = 3 * Math.max(1, Math.floor(points.length / 3 / 6000));
+  let most = 0;
+  for (let i = 0; i < points.length; i += step) {
+    const p = subtract([points[i], points[i + 1], points[i + 2]], camera.target);
+    const depth = (camera.distance - dot(p, back)) * t;
+    most = Math.max(most, Math.abs(dot(p, right)) / (depth * aspect), Math.abs(dot(p, up)) / depth);
+  }
+  return most;
+}
+
 // Round numbers from lo to hi, about `count` of them.
 function niceStep(span, count) {
   if (!(span > 0)) return 1;
