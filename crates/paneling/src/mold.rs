@@ -171,17 +171,23 @@ impl Mold {
                     fyy: 2.0 * c + 2.0 * g * x + 6.0 * h * y,
                 }
             }
-            MoldType::Torus => self.torus_height(x, y).map_or(UNREACHED, |z| {
-                let [k1, k2, g, ..] = self.parameters.map(Taylor::constant);
-                let [x, y, z] = variables([x, y, z]);
-                Height::of(explicit::<3, 2>(z.value, torus_equation(x, y, [k1, k2, g], z)))
-            }),
-            MoldType::Cylinder | MoldType::Sphere => {
-                let [k1, k2] = self.round_curvatures().map(Taylor::constant);
-                let [x, y] = variables([x, y]);
-                Height::of::<2>(round_height(x, y, k1, k2))
-            }
+            MoldType::Torus | MoldType::Cylinder | MoldType::Sphere => self.round_at(x, y),
         }
+    }
+
+    // Apart, so that the polynomials do not pay for its large stack frame.
+    #[inline(never)]
+    fn round_at(&self, x: f64, y: f64) -> Height {
+        if self.kind != MoldType::Torus {
+            let [k1, k2] = self.round_curvatures().map(Taylor::constant);
+            let [x, y] = variables([x, y]);
+            return Height::of::<2>(round_height(x, y, k1, k2));
+        }
+        self.torus_height(x, y).map_or(UNREACHED, |z| {
+            let [k1, k2, g, ..] = self.parameters.map(Taylor::constant);
+            let [x, y, z] = variables([x, y, z]);
+            Height::of(explicit::<3, 2>(z.value, torus_equation(x, y, [k1, k2, g], z)))
+        })
     }
 
     /// Derivatives of `f, f_x, f_y` in the parameters at `(x, y)`.
@@ -200,7 +206,18 @@ impl Mold {
                 rows[1] = [2.0 * x, y, 0.0, 3.0 * xx, 2.0 * xy, yy, 0.0];
                 rows[2] = [0.0, x, 2.0 * y, 0.0, xx, 2.0 * xy, 3.0 * yy];
             }
-            MoldType::Torus => match self.torus_rows(x, y) {
+            MoldType::Torus | MoldType::Cylinder | MoldType::Sphere => {
+                return self.round_rows(x, y);
+            }
+        }
+        rows
+    }
+
+    #[inline(never)]
+    fn round_rows(&self, x: f64, y: f64) -> ParameterRows {
+        let mut rows = [[0.0; MAX_PARAMETERS]; 3];
+        if self.kind == MoldType::Torus {
+            match self.torus_rows(x, y) {
                 Some(z) => {
                     for i in 0..3 {
                         rows[0][i] = z.first[2 + i];
@@ -209,20 +226,19 @@ impl Mold {
                     }
                 }
                 None => rows.iter_mut().for_each(|row| row[..3].fill(f64::NAN)),
-            },
-            MoldType::Cylinder | MoldType::Sphere => {
-                let [k1, k2] = self.round_curvatures();
-                let [x, y, k1, k2] = variables([x, y, k1, k2]);
-                let z = round_height(x, y, k1, k2);
-                for (row, [along_x, along_y]) in rows.iter_mut().zip([
-                    [z.first[2], z.first[3]],
-                    [z.second[0][2], z.second[0][3]],
-                    [z.second[1][2], z.second[1][3]],
-                ]) {
-                    let is_sphere = self.kind == MoldType::Sphere;
-                    row[0] = if is_sphere { along_x + along_y } else { along_x };
-                }
             }
+            return rows;
+        }
+        let [k1, k2] = self.round_curvatures();
+        let [x, y, k1, k2] = variables([x, y, k1, k2]);
+        let z = round_height(x, y, k1, k2);
+        for (row, [along_x, along_y]) in rows.iter_mut().zip([
+            [z.first[2], z.first[3]],
+            [z.second[0][2], z.second[0][3]],
+            [z.second[1][2], z.second[1][3]],
+        ]) {
+            let is_sphere = self.kind == MoldType::Sphere;
+            row[0] = if is_sphere { along_x + along_y } else { along_x };
         }
         rows
     }

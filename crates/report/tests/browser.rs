@@ -121,6 +121,23 @@ fn the_surface_is_drawn_and_brushing_works_both_ways() {
 }
 
 #[test]
+fn the_share_of_a_brush_is_that_of_the_area() {
+    let Some(page) = Page::written("the_share_of_a_brush_is_that_of_the_area") else { return };
+    let (dom, _) =
+        page.run("stage=after&axes=HK&brush=-9,0,9,9&behind=none", &["--dump-dom".to_owned()]);
+    let note = dom.split("id=\"brush-note\"").nth(1).unwrap();
+    let text = note.split(['>', '%']).nth(1).unwrap();
+    // The outer side of a torus, K > 0, has the share 1/2 + r / (π R) of its area.
+    let want = 50.0 + 100.0 * 0.9 / (3.0 * std::f64::consts::PI);
+    let got: f64 = text.trim().parse().unwrap();
+    assert!((got - want).abs() < 2.0, "{got} % instead of {want} %");
+    // The key names the stage and the curve of umbilics; no other stage lies behind.
+    let key =
+        dom.split("id=\"diagram-key\"").nth(1).unwrap().split("</span></span>").next().unwrap();
+    assert!(key.contains("after") && key.contains("K = H²") && !key.contains("before"), "{key}");
+}
+
+#[test]
 fn modes_and_stages_look_different() {
     let Some(page) = Page::written("modes_and_stages_look_different") else { return };
     let shots = ["mode=zebra", "mode=groups", "stage=before", "compare=before&stage=after"]
