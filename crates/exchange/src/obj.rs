@@ -236,7 +236,12 @@ fn write_mesh(text: &mut String, mesh: &Mesh, base: usize) {
         if group != current {
             current = group;
             let name = group.and_then(|g| mesh.groups.get(g)).map_or("", |g| g.name.as_str());
-            let _ = writeln!(text, "g {}", one_line(name));
+            let name = one_line(name);
+            let _ = writeln!(text, "g {name}");
+            // One material per group, which programs give a colour of its own.
+            if !name.is_empty() {
+                let _ = writeln!(text, "usemtl {name}");
+            }
         }
         indices(text, "f", corners, base);
     }
@@ -273,7 +278,9 @@ mod tests {
         assert_eq!(mesh.face_groups, [0, 1]);
         assert_eq!(mesh.positions[3], DVec3::new(0.0, 1.0, 0.5));
         assert!(warnings.is_empty());
-        assert_eq!(read_obj(&write_obj(std::slice::from_ref(&mesh))).unwrap().0, mesh);
+        let written = write_obj(std::slice::from_ref(&mesh));
+        assert!(written.contains("g left\nusemtl left\nf 1 2 3 4\ng right\nusemtl right\n"));
+        assert_eq!(read_obj(&written).unwrap(), (mesh, warnings));
     }
 
     #[test]
