@@ -452,16 +452,7 @@ fn fill_report(
     let before = samples_of(&result.initial, &result.initial_surface);
     page.stages.push(view("before", &before, &page.length_unit)?);
     let samples = samples_of(&result.mesh, &result.surface);
-    let count = |kind| samples.umbilics.iter().filter(|u| u.kind == kind).count();
-    page.option(
-        "umbilics of the result",
-        format!(
-            "{} lemons, {} monstars, {} stars",
-            count(UmbilicKind::Lemon),
-            count(UmbilicKind::Monstar),
-            count(UmbilicKind::Star)
-        ),
-    );
+    page.option("umbilics of the result", umbilics(&samples));
     page.stages.push(view("after", &samples, &page.length_unit)?);
     let mut history = EnergyHistory::default();
     let mut values = Vec::new();
@@ -472,6 +463,24 @@ fn fill_report(
     history.terms.push(Series { name: options.energy.to_string(), values });
     page.energies = Some(history);
     Ok(())
+}
+
+fn umbilics(samples: &SurfaceSamples) -> String {
+    let count = |kind| samples.umbilics.iter().filter(|u| u.kind == kind).count();
+    let mut text = format!(
+        "{} lemons, {} monstars, {} stars",
+        count(Some(UmbilicKind::Lemon)),
+        count(Some(UmbilicKind::Monstar)),
+        count(Some(UmbilicKind::Star))
+    );
+    let mut others: BTreeMap<i32, usize> = BTreeMap::new();
+    for umbilic in samples.umbilics.iter().filter(|u| u.kind.is_none()) {
+        *others.entry(umbilic.half_turns).or_default() += 1;
+    }
+    for (half_turns, count) in others {
+        text += &format!(", {count} of index {}", 0.5 * f64::from(half_turns));
+    }
+    text
 }
 
 fn view(name: &str, samples: &SurfaceSamples, unit: &str) -> Result<SurfaceView, Failure> {
@@ -511,9 +520,10 @@ fn view(name: &str, samples: &SurfaceSamples, unit: &str) -> Result<SurfaceView,
     for (id, label, role, lines) in [
         ("f1", "first harmonic F1", LineRole::Directions, strokes(&samples.f1_strokes)),
         ("f3", "third harmonic F3", LineRole::Directions, strokes(&samples.f3_strokes)),
-        ("lemons", "umbilics: lemons", LineRole::Curves, marks(UmbilicKind::Lemon)),
-        ("monstars", "umbilics: monstars", LineRole::Curves, marks(UmbilicKind::Monstar)),
-        ("stars", "umbilics: stars", LineRole::Curves, marks(UmbilicKind::Star)),
+        ("lemons", "umbilics: lemons", LineRole::Curves, marks(Some(UmbilicKind::Lemon))),
+        ("monstars", "umbilics: monstars", LineRole::Curves, marks(Some(UmbilicKind::Monstar))),
+        ("stars", "umbilics: stars", LineRole::Curves, marks(Some(UmbilicKind::Star))),
+        ("higher", "umbilics of higher order", LineRole::Curves, marks(None)),
     ] {
         if !lines.is_empty() {
             view = view.with_lines(LineSet::new(id, label, role, lines)).map_err(drawn)?;

@@ -41,6 +41,7 @@ mod rules;
 mod samples;
 mod splines;
 mod symmetry;
+mod umbilics;
 
 pub use analysis::{SurfaceAnalysis, analyze, fitted_torus};
 pub use constraints::Constraints;
@@ -54,5 +55,6 @@ pub use fair::{
 pub use family::fair_in_family;
 pub use functional::{Energy, Functional};
 pub use rules::Quadrature;
-pub use samples::{SurfaceSamples, Umbilic};
+pub use samples::SurfaceSamples;
 pub use splines::{SplinePatchError, SplinePatches, spline_patches};
+pub use umbilics::Umbilic;

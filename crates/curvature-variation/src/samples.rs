@@ -1,20 +1,12 @@
 //! A surface sampled for looking at: curvatures, their variation, umbilics.
 
-use geom_core::{DVec3, PolyMesh, SurfaceJet, ThirdOrder, UmbilicKind, principal_curvatures};
+use crate::umbilics::{DirectionField, Umbilic};
+use geom_core::{DVec3, PolyMesh, SurfaceJet, ThirdOrder, principal_curvatures};
 use rayon::prelude::*;
 use subdiv_catmull_clark::{Patch, SubdivisionSurface};
 
 /// Derivatives next to an extraordinary corner are taken at least this far from it.
 const CORNER: f64 = 2e-3;
-
-/// An umbilic and its kind.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Umbilic {
-    /// Where it is, to the accuracy of the sampling.
-    pub position: DVec3,
-    /// Pattern of the curvature lines around it.
-    pub kind: UmbilicKind,
-}
 
 /// Samples on a grid per patch, as one triangle mesh.
 #[derive(Clone, Debug, Default)]
@@ -47,7 +39,6 @@ pub struct SurfaceSamples {
 
 struct PatchSamples {
     points: Vec<(DVec3, Option<ThirdOrder>, [f64; 2])>,
-    umbilics: Vec<Umbilic>,
 }
 
 impl SurfaceSamples {
@@ -64,6 +55,18 @@ impl SurfaceSamples {
         for patch in &patches {
             out.push(patch, side);
         }
+        let mut directions = DirectionField::new(mesh, side);
+        for (patch, samples) in surface.patches().iter().zip(&patches) {
+            for (k, (position, shape, _)) in samples.points.iter().enumerate() {
+                if let Some(shape) = shape {
+                    directions.insert(patch, (k / side, k % side), *position, shape);
+                }
+            }
+        }
+        out.umbilics = directions.umbilics(surface.patches(), |patch, u, v| {
+            let jet = jet_at(mesh, surface, &surface.patches()[patch], u, v);
+            Some((jet.position(), ThirdOrder::new(&jet).ok()?))
+        });
         let length = 0.8 * mesh.mean_edge_length();
         out.add_strokes(&patches, side, length);
         out
@@ -91,7 +94,6 @@ impl SurfaceSamples {
                 self.triangles.push([b - 1, d, b]);
             }
         }
-        self.umbilics.extend_from_slice(&patch.umbilics);
     }
 
     /// Strokes at the patches' centres; the longest has the given length.
@@ -150,85 +152,67 @@ fn sample_patch(
 ) -> PatchSamples {
     let at = |i: usize| i as f64 / (side - 1) as f64;
     let mut points = Vec::with_capacity(side * side);
-    let mut directions = Vec::with_capacity(side * side);
     for k in 0..side * side {
         let jet = jet_at(mesh, surface, patch, at(k / side), at(k % side));
         let shape = ThirdOrder::new(&jet).ok();
         let principal =
             jet.second_form().and_then(|second| principal_curvatures(jet.first_form(), second));
         points.push((jet.position(), shape, principal.map_or([f64::NAN; 2], |p| [p.k1, p.k2])));
-        directions.push(shape.map(|s| first_direction(&s)));
     }
-    let mut umbilics = Vec::new();
-    for i in 1..side {
-        for j in 1..side {
-            let corners =
-                [(i - 1) * side + j - 1, i * side + j - 1, i * side + j, (i - 1) * side + j];
-            let index = corners
-                .iter()
-                .map(|&k| points[k].1.zip(directions[k]))
-                .collect::<Option<Vec<_>>>()
-                .map_or(0, |around| half_turns(&around));
-            if index.abs() == 1 {
-                let (u, v) = (at(i) - 0.5 * at(1), at(j) - 0.5 * at(1));
-                let jet = jet_at(mesh, surface, patch, u, v);
-                if let Ok(shape) = ThirdOrder::new(&jet) {
-                    // The winding number tells a star; the third order tells lemon from monstar.
-                    let kind = match (index, shape.umbilic_kind()) {
-                        (-1, _) => UmbilicKind::Star,
-                        (_, UmbilicKind::Monstar) => UmbilicKind::Monstar,
-                        _ => UmbilicKind::Lemon,
-                    };
-                    umbilics.push(Umbilic { position: jet.position(), kind });
-                }
-            }
-        }
-    }
-    PatchSamples { points, umbilics }
-}
-
-// Unit vector of the first principal direction.
-fn first_direction(shape: &ThirdOrder) -> DVec3 {
-    let [l, m, q] = shape.second;
-    let angle = 0.5 * (2.0 * m).atan2(l - q);
-    angle.cos() * shape.e1 + angle.sin() * shape.e2
-}
-
-/// Half-turns of the principal direction around a cell.
-fn half_turns(around: &[(ThirdOrder, DVec3)]) -> i32 {
-    let mut total = 0.0;
-    for k in 0..4 {
-        let (shape, here) = &around[k];
-        let (_, next) = &around[(k + 1) % 4];
-        let normal = shape.e1.cross(shape.e2);
-        let next = next.reject_from(normal);
-        let aligned = if next.dot(*here) < 0.0 { -next } else { next };
-        total += here.cross(aligned).dot(normal).atan2(here.dot(aligned));
-    }
-    (total / std::f64::consts::PI).round() as i32
+    PatchSamples { points }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use geom_core::UmbilicKind;
     use subdiv_catmull_clark::{Blend, Creases, refine};
+
+    fn umbilics(mesh: &PolyMesh, refinements: usize, side: usize) -> Vec<Umbilic> {
+        let fine = (0..refinements)
+            .fold(mesh.clone(), |mesh, _| refine(&mesh, &Creases::none()).unwrap().mesh);
+        let surface = SubdivisionSurface::new(&fine, &Creases::none(), Blend::Smooth).unwrap();
+        let samples = SurfaceSamples::new(&fine, &surface, side);
+        assert_eq!(samples.positions.len(), fine.face_count() * side * side);
+        let half_turns: i32 = samples.umbilics.iter().map(|u| u.half_turns).sum();
+        assert_eq!(half_turns as isize, 2 * mesh.euler_characteristic() as isize, "Poincaré-Hopf");
+        samples.umbilics
+    }
 
     #[test]
     fn an_ellipsoid_has_four_lemons() {
-        let mesh = fixtures::quad_graphs::ellipsoid(6, DVec3::new(1.0, 1.4, 2.0));
-        let fine = refine(&mesh, &Creases::none()).unwrap();
-        let surface = SubdivisionSurface::new(&fine.mesh, &fine.creases, Blend::Smooth).unwrap();
-        let samples = SurfaceSamples::new(&fine.mesh, &surface, 4);
-        assert_eq!(samples.positions.len(), fine.mesh.face_count() * 16);
-        // The indices of all umbilics sum up to the Euler characteristic.
-        let index: i32 =
-            samples.umbilics.iter().map(|u| if u.kind == UmbilicKind::Star { -1 } else { 1 }).sum();
-        assert_eq!(index, 4);
-        for umbilic in &samples.umbilics {
-            // The true ones lie in the plane of the longest and the shortest axis.
-            if samples.umbilics.len() == 4 {
-                assert!(umbilic.position.y.abs() < 0.15, "{umbilic:?}");
-                assert_eq!(umbilic.kind, UmbilicKind::Lemon);
+        let [a, b, c] = [1.0_f64, 1.4, 2.0];
+        // In the plane of the longest and the shortest axis, at the heights of the closed form.
+        let x = a * ((b * b - a * a) / (c * c - a * a)).sqrt();
+        let z = c * ((c * c - b * b) / (c * c - a * a)).sqrt();
+        for (n, side) in [(6, 4), (12, 4), (12, 9)] {
+            let mesh = fixtures::quad_graphs::ellipsoid(n, DVec3::new(a, b, c));
+            let found = umbilics(&mesh, 1, side);
+            assert_eq!(found.len(), 4, "{found:?}");
+            for umbilic in &found {
+                assert_eq!(umbilic.kind, Some(UmbilicKind::Lemon));
+                let near = umbilic.position.abs().distance(DVec3::new(x, 0.0, z));
+                assert!(near < if n == 12 { 0.12 } else { 0.2 }, "{umbilic:?}: {near}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_torus_has_no_umbilic() {
+        for (nu, nv) in [(24, 12), (13, 9)] {
+            assert_eq!(umbilics(&fixtures::quad_graphs::torus(nu, nv, 1.0, 0.4), 0, 4), []);
+        }
+    }
+
+    #[test]
+    fn indices_sum_to_the_euler_characteristic() {
+        // Symmetry puts umbilics of several orders on samples and extraordinary vertices; a sphere
+        // is nothing but umbilics.
+        use fixtures::quad_graphs as graphs;
+        let sphere = graphs::ellipsoid(4, DVec3::ONE);
+        for mesh in [graphs::theta_graph(3), graphs::theta_graph(4), graphs::cube_graph(), sphere] {
+            for side in [2, 3, 5] {
+                umbilics(&mesh, 1, side);
             }
         }
     }
