@@ -1,7 +1,8 @@
 //! Minimises a functional of one of the canonical inputs and prints every level; writes the
 //! control mesh as OBJ if a file is given.
 //!
-//! `cargo run --release --example canonical -- theta3 mehlum_tarrou 2 [auto|none] [METHOD] [out.obj]`
+//! `cargo run --release --example canonical -- theta3 mehlum_tarrou 2 [auto|none] [METHOD] [out.obj|-]
+//! [ITERATIONS] [ENERGIES]`, with the energies (1865,1840) whose first passing is to be timed.
 
 use curvature_variation::{Constraints, FairOptions, Method, SymmetryMode, fair};
 use fixtures::quad_graphs;
@@ -43,17 +44,21 @@ fn main() -> Result<(), Box<dyn Error>> {
     };
     let begin = std::time::Instant::now();
     let mut out = std::io::stdout();
+    let mut watched: Vec<f64> = argument(8, "").split(',').filter_map(|e| e.parse().ok()).collect();
+    let mut passed = Vec::new();
     let result = fair(&mesh, &Creases::none(), &Constraints::default(), &options, |p| {
-        if p.iteration % 10 == 0 {
-            tracing::debug!(
-                level = p.level,
-                energy = p.energy,
-                "{:.2}",
-                begin.elapsed().as_secs_f64()
-            );
-        }
+        watched.retain(|&energy| {
+            let waiting = p.energy > energy;
+            if !waiting {
+                passed.push((energy, p.vertices, begin.elapsed().as_secs_f64()));
+            }
+            waiting
+        });
         ControlFlow::Continue(())
     })?;
+    for (energy, vertices, seconds) in passed {
+        writeln!(out, "below {energy} at {vertices} vertices after {seconds:.2} s")?;
+    }
     for level in &result.report.levels {
         writeln!(
             out,

@@ -34,7 +34,7 @@ const SETTLED: f64 = 0.01;
 /// Steps L-BFGS remembers.
 const MEMORY: usize = 20;
 /// Share of the energy that the barrier costs on an evenly parametrised surface.
-const BARRIER: f64 = 1e-4;
+const BARRIER: f64 = 1e-3;
 
 /// State of the descent on one level.
 pub(crate) struct Level<'a> {
@@ -231,6 +231,7 @@ impl Level<'_> {
         self.work = Workspace::default();
         let mut coefficients = self.energy.coefficients();
         coefficients.plain.root_epsilon = ROOT_EPSILON / area;
+        coefficients.plain.barrier = self.barrier;
         let density = coefficients.plain.plus(area, &coefficients.scaled);
         for attempt in 1.. {
             let mixture = Mixture { density, gauss_newton, sobolev };

@@ -127,6 +127,12 @@ const UNBOUNDED: f64 = 1e6;
 const FIRST_NEWTON_STEPS: usize = 25;
 const LATER_NEWTON_STEPS: usize = 4;
 
+/// Relative quadrature gap above which a result does not count as converged: the control mesh has
+/// folded up between the quadrature points.
+const LARGEST_GAP: f64 = 0.01;
+/// Differences of an energy below this are rounding errors: a flat sheet has no other energy.
+const NO_ENERGY: f64 = 1e-9;
+
 /// How much larger the tolerance of the levels before the last two is.
 const COARSE_TOLERANCE: f64 = 100.0;
 
@@ -166,7 +172,8 @@ pub struct LevelReport {
 /// What [`fair`] did.
 #[derive(Clone, Debug, PartialEq)]
 pub struct FairReport {
-    /// How the last level ended.
+    /// How the last level ended; `Stalled` in place of `Converged` if the quadrature gap is above
+    /// 1 %.
     pub status: Status,
     /// Steps on all levels.
     pub iterations: usize,
@@ -316,7 +323,13 @@ pub(crate) fn finished(
     let energy_final = after.total(&options.energy);
     let difference = (coarse.total(&options.energy) - energy_final).abs();
     let quadrature_gap = if difference == 0.0 { 0.0 } else { difference / energy_final.abs() };
-    let status = levels.last().map_or(Status::Interrupted, |l| l.status);
+    let status = match levels.last().map_or(Status::Interrupted, |l| l.status) {
+        // What was minimised is not the surface's energy then.
+        Status::Converged if quadrature_gap > LARGEST_GAP && difference > NO_ENERGY => {
+            Status::Stalled
+        }
+        status => status,
+    };
     let extrapolated = match &levels[..] {
         [.., a, b] if status != Status::Interrupted && constraints.weights.is_empty() => {
             Some(energy_final - (a.final_energy - b.final_energy) / 3.0)

@@ -7,7 +7,7 @@ use crate::evaluator::{SurfaceEnergy, Workspace, flatten};
 use crate::freedom::Freedom;
 use crate::functional::{Energy, Functional, ROOT_EPSILON};
 use crate::metric::{MetricAssembly, Mixture};
-use crate::rules::{Quadrature, gauss_legendre};
+use crate::rules::{Quadrature, gauss_legendre, quartered};
 use crate::symmetry::SymmetryGroup;
 use fixtures::quad_graphs;
 use geom_core::{DVec3, PolyMesh};
@@ -204,6 +204,14 @@ fn refined(mesh: &PolyMesh, creases: &Creases, levels: usize) -> (PolyMesh, Crea
     })
 }
 
+/// Unknowns of a case, their values, the control points they stand for, and the energies.
+struct Unknowns {
+    freedom: Freedom,
+    y: Vec<f64>,
+    x: Vec<f64>,
+    evaluator: SurfaceEnergy,
+}
+
 impl Case {
     fn new(mesh: &PolyMesh, creases: &Creases, levels: usize, blend: Blend) -> Self {
         let (mesh, left) = refined(mesh, creases, levels);
@@ -243,6 +251,20 @@ impl Case {
         }
     }
 
+    /// What the energies of the case depend on, with the mesh's symmetries or without.
+    fn unknowns(&self, symmetric: bool, fixed: &[bool], quadrature: Quadrature) -> Unknowns {
+        let group = self.group(symmetric);
+        let n = self.mesh.vertex_count();
+        let freedom = Freedom::new(self.mesh.positions(), fixed, &group);
+        let y = freedom.restrict(&flatten(self.mesh.positions()));
+        let mut x = vec![0.0; 3 * n];
+        freedom.expand(&y, &mut x);
+        let multiplicities = group.face_multiplicities();
+        let evaluator =
+            SurfaceEnergy::with_multiplicities(&self.surface, n, quadrature, &multiplicities);
+        Unknowns { freedom, y, x, evaluator }
+    }
+
     /// All samples of the patches with their quadrature weights; every patch counts as often as
     /// `multiplicities` says.
     fn samples(
@@ -260,7 +282,7 @@ impl Case {
             }
             let table = tables.entry(patch.basis).or_insert_with(|| {
                 let plain = self.surface.b_spline_grid(patch.basis).is_some();
-                let rule = gauss_legendre(if plain { regular } else { other });
+                let rule = if plain { gauss_legendre(regular) } else { quartered(other) };
                 let product = |&(u, a): &(f64, f64)| {
                     let at =
                         |&(v, b): &(f64, f64)| (a * b, self.surface.weights(patch.basis, u, v));
@@ -316,19 +338,10 @@ fn gradients_match_dual_numbers() {
             if symmetric && case.creases {
                 continue;
             }
-            let group = case.group(symmetric);
             let n = case.mesh.vertex_count();
-            let freedom = Freedom::new(case.mesh.positions(), &vec![false; n], &group);
-            let y = freedom.restrict(&flatten(case.mesh.positions()));
-            let mut x = vec![0.0; 3 * n];
-            freedom.expand(&y, &mut x);
             let quadrature = Quadrature { regular: 4, extraordinary: 6 };
-            let evaluator = SurfaceEnergy::with_multiplicities(
-                &case.surface,
-                n,
-                quadrature,
-                &group.face_multiplicities(),
-            );
+            let Unknowns { freedom, y, x, evaluator } =
+                case.unknowns(symmetric, &vec![false; n], quadrature);
             let mut work = Workspace::default();
             let area = evaluator.area(&x, &mut work);
             for seed in [0.4, 1.9] {
@@ -371,21 +384,12 @@ fn gauss_newton_products_match_dual_numbers() {
             if symmetric && case.creases {
                 continue;
             }
-            let group = case.group(symmetric);
             let n = case.mesh.vertex_count();
             let mut fixed = vec![false; n];
             // A fixed vertex shows up in the structure of the matrix.
             fixed[0] = !symmetric;
-            let freedom = Freedom::new(case.mesh.positions(), &fixed, &group);
-            let y = freedom.restrict(&flatten(case.mesh.positions()));
-            let mut x = vec![0.0; 3 * n];
-            freedom.expand(&y, &mut x);
-            let evaluator = SurfaceEnergy::with_multiplicities(
-                &case.surface,
-                n,
-                Quadrature::COARSE,
-                &group.face_multiplicities(),
-            );
+            let Unknowns { freedom, y, x, evaluator } =
+                case.unknowns(symmetric, &fixed, Quadrature::COARSE);
             let metric = MetricAssembly::new(&case.surface, &evaluator, &freedom, &[]).unwrap();
             let area = evaluator.area(&x, &mut Workspace::default());
             let moved = |seed: f64| {
@@ -395,7 +399,7 @@ fn gauss_newton_products_match_dual_numbers() {
                 freedom.expand(&to, &mut dx);
                 dx.iter_mut().zip(&x).for_each(|(d, x)| *d -= x);
                 // Residuals depend on the direction of `S_u`, so the same faces have to be taken.
-                let counts = group.face_multiplicities();
+                let counts = case.group(symmetric).face_multiplicities();
                 (dy, case.samples(&along(&x, &dx), &counts, 4, 8))
             };
             let ((p, at_p), (q, at_q)) = (moved(0.7), moved(2.3));

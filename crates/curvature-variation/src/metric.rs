@@ -19,6 +19,8 @@ const EXTRAORDINARY_NODES: usize = 8;
 const BATCH: usize = 64;
 /// `ℓ²` of the Sobolev norm as a share of the area.
 const LENGTH_SQUARED: f64 = 1.0 / 40.0;
+/// Residuals of a sample at most: four harmonics, three of the second form, the barrier.
+const RESIDUALS: usize = 8;
 /// Area elements below this share of the mean are raised to it.
 const LEAST_AREA: f64 = 1e-3;
 
@@ -374,7 +376,7 @@ impl WithSimd for ElementMatrix<'_> {
         let (weights, _) = S::as_simd_f64s(&table.weights);
         let mut points = vec![[0.0; 3]; count];
         gather(self.positions, self.controls, &mut points);
-        let mut residuals = vec![0.0; MAX_LANES * 7 * width];
+        let mut residuals = vec![0.0; MAX_LANES * RESIDUALS * width];
         // The Sobolev part: the same for all three coordinates.
         let scalar_width = count.next_multiple_of(MAX_LANES);
         let mut scalar_rows = vec![0.0; MAX_LANES * 9 * scalar_width];
@@ -473,10 +475,10 @@ fn residual_adjoints<S: Simd>(
     shape: &Shape<S>,
     weight: Lanes<S>,
     w: &Density,
-) -> ([FrameAdjoint<S>; 7], usize) {
+) -> ([FrameAdjoint<S>; RESIDUALS], usize) {
     let zero = Lanes::splat(simd, 0.0);
     let nothing = FrameAdjoint { harmonics: [zero; 4], second: [zero; 3], area: zero };
-    let mut out = [nothing; 7];
+    let mut out = [nothing; RESIDUALS];
     let root_area = shape.area.sqrt();
     let half = root_area.recip() * 0.5;
     let root_weight = weight.sqrt();
@@ -516,6 +518,12 @@ fn residual_adjoints<S: Simd>(
             out[rows].area = value * half * scale;
             rows += 1;
         }
+    }
+    if w.barrier > 0.0 {
+        // The barrier c/J curves by 2c/J³ along J.
+        let curving = shape.inv_area * shape.inv_area * shape.inv_area * (2.0 * w.barrier);
+        out[rows].area = root_weight * curving.sqrt();
+        rows += 1;
     }
     (out, rows)
 }

@@ -56,7 +56,7 @@ pub(crate) fn gauss_legendre(n: usize) -> Vec<(f64, f64)> {
 
 /// `n` nodes on `[0, 1]`, a Gauss-Legendre rule on each quarter if `n` is a multiple of 4: patches
 /// that are not bi-cubic have knots at the quarters, where third derivatives jump.
-fn quartered(n: usize) -> Vec<(f64, f64)> {
+pub(crate) fn quartered(n: usize) -> Vec<(f64, f64)> {
     if !n.is_multiple_of(4) {
         return gauss_legendre(n);
     }
