@@ -14,6 +14,7 @@ mod net_report;
 mod outcome;
 mod panel_files;
 mod report_support;
+mod surface_file;
 
 use clap::{CommandFactory, Parser};
 use context::Context;

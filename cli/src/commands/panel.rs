@@ -8,6 +8,7 @@ use crate::outcome::{Outcome, Status};
 use crate::panel_files::{PANEL_OUTPUTS, Quality, encode};
 use crate::report_support;
 use crate::report_support::panels::paneling_report;
+use crate::surface_file::read_surface;
 use bspline::BsplineSurface;
 use exchange::LengthUnit;
 use paneling::{
@@ -142,6 +143,11 @@ impl PanelOptions {
         }
         let types = self.mold_types.as_deref().unwrap_or(&[MoldType::Cubic]);
         report.option("mold types", types.iter().map(|t| t.name()).collect::<Vec<_>>().join(", "));
+        if let Some(path) = &self.prices {
+            report.option("prices", path.display());
+        }
+        let most = self.seam_steps.unwrap_or_else(|| Options::with_molds(1).seam_steps);
+        report.option("most seam steps", most);
     }
 
     fn clustering(&self) -> Result<Clustering, Failure> {
@@ -200,9 +206,11 @@ impl Panel {
         }
         let options = self.options.over(config);
         let rule = options.rule()?.unwrap_or(MoldRule::PerRoot(3.0));
-        let (surface, unit) = read_surface(&self.surface)?;
-        let layout = options.layout(&surface)?;
-        let set = PanelSet::new(&surface, &layout).map_err(|e| Failure::input(&self.surface, e))?;
+        let (model, named) = read_surface(&self.surface)?;
+        let unit = model.unit;
+        let layout = options.layout(&named.surface)?;
+        let set =
+            PanelSet::new(&named.surface, &layout).map_err(|e| Failure::input(&self.surface, e))?;
         let prices = match &options.prices {
             None => PriceList::counting_molds(),
             Some(path) => exchange::read_ron(path).map_err(|e| Failure::input(path, e))?,
@@ -217,6 +225,7 @@ impl Panel {
                 worst_excess: result.worst_excess,
                 grid: result.grid.as_ref().map(|grid| Quality::new(&set, grid)),
             })?;
+        outcome.warnings = model.warnings;
         outcome.require_converged = self.converged.require_converged;
         outcome.summary = summary(&set, &result, &unit);
         for path in self.output {
@@ -266,18 +275,6 @@ fn not_unrolled(paneling: &Paneling, path: &Path) -> Option<String> {
             paneling.labels.len()
         )
     })
-}
-
-fn read_surface(path: &Path) -> Result<(BsplineSurface, LengthUnit), Failure> {
-    let mut model = exchange::read_model(path).map_err(|e| Failure::input(path, e))?;
-    let found = model.surfaces.len();
-    match model.surfaces.pop() {
-        Some(named) if found == 1 => Ok((named.surface, model.unit)),
-        _ => Err(Failure::input(
-            path,
-            format!("{found} B-spline surfaces; panel works on exactly one"),
-        )),
-    }
 }
 
 struct Solved {

@@ -9,8 +9,9 @@ use crate::layered;
 use crate::outcome::Outcome;
 use crate::report_support;
 use crate::report_support::weingarten::weingarten_report;
+use crate::surface_file::read_surface;
 use bspline::BsplineSurface;
-use exchange::{LengthUnit, Model, NamedSurface};
+use exchange::{LengthUnit, Model};
 use serde::{Deserialize, Deserializer, Serialize};
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
@@ -140,25 +141,6 @@ impl Weingarten {
             report_support::add_files(&mut outcome, &self.report, context, report)?;
         }
         Ok(outcome)
-    }
-}
-
-/// The one surface of a file.
-fn read_surface(path: &Path) -> Result<(Model, NamedSurface), Failure> {
-    let mut model = exchange::read_model(path).map_err(|e| Failure::input(path, e))?;
-    match model.surfaces.len() {
-        1 => {
-            let named = model.surfaces.remove(0);
-            Ok((model, named))
-        }
-        0 => Err(Failure::input(
-            path,
-            "there is no B-spline surface in this file; give a RON scene or a STEP file with one",
-        )),
-        n => Err(Failure::input(
-            path,
-            format!("there are {n} surfaces in this file; leave one of them in it"),
-        )),
     }
 }
 

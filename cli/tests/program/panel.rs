@@ -68,6 +68,16 @@ fn bad_input_is_one_sentence() {
 }
 
 #[test]
+fn a_file_without_a_surface_is_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("panels.csv").display().to_string();
+    let output = panel("fixtures/grid.obj", &["-o", &out]);
+    let message = String::from_utf8(output.stderr).unwrap();
+    assert_eq!(output.status.code(), Some(2));
+    assert!(message.contains("fixtures/grid.obj: there is no B-spline surface"), "{message}");
+}
+
+#[test]
 fn bounds_that_cannot_be_met_are_a_status() {
     let folder = tempfile::tempdir().unwrap();
     let path = |name: &str| folder.path().join(name).display().to_string();
