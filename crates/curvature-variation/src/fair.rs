@@ -16,7 +16,8 @@ use serde::{Deserialize, Serialize};
 use std::ops::ControlFlow;
 use std::time::Instant;
 use subdiv_catmull_clark::{
-    Blend, Creases, SubdivisionError, SubdivisionSurface, refine, refinements_needed,
+    Blend, Creases, INFINITE_SHARPNESS, SubdivisionError, SubdivisionSurface, refine,
+    refinements_needed,
 };
 
 /// Which symmetries of the input are kept.
@@ -189,7 +190,8 @@ pub struct FairReport {
     pub energy_final: f64,
     /// Relative difference of the energy between the quadrature used and the fine one.
     pub quadrature_gap: f64,
-    /// `|∫K − 2πχ| / ∫|K|` of the result; NaN for an open surface.
+    /// `|∫K − 2πχ| / ∫|K|` of the result; NaN for an open surface and one with sharp
+    /// edges.
     pub gauss_bonnet_residual: f64,
     /// Norm of the gradient at the end, in the metric of the method.
     pub gradient_norm: f64,
@@ -304,7 +306,12 @@ pub fn fair(
         levels.push(report);
     }
     let surface = SubdivisionSurface::new(&mesh, &creases, options.blend)?;
-    let report = finished(&mesh, &surface, constraints, options, before, levels, gradient_norm);
+    let mut report = finished(&mesh, &surface, constraints, options, before, levels, gradient_norm);
+    let sharp = |h| creases.sharpness(mesh.origin(h), mesh.target(h)) == INFINITE_SHARPNESS;
+    if mesh.edges().any(sharp) {
+        // A sharp edge holds curvature that the patches do not have.
+        report.gauss_bonnet_residual = f64::NAN;
+    }
     Ok(Fairing { initial, initial_surface, mesh, creases, surface, report })
 }
 
