@@ -1,6 +1,7 @@
 //! The program from the outside: files, metrics, exit codes, messages. One test program, so that
 //! what the tests share stands once and is linked once.
 
+mod asymptotic;
 mod bad_input;
 mod common;
 mod dist;

@@ -3,6 +3,7 @@
 use super::Options;
 use asymptotic_bezier::{Design, Lamella, LamellaOptions, lamellas, strip_layout};
 use exchange::{Drawing, DrawnLine, Label, LengthUnit};
+use geom_core::DVec3;
 use std::path::{Path, PathBuf};
 
 /// Drawings and tables of the strips.
@@ -34,7 +35,7 @@ fn strip_drawing(strips: &[Lamella], settings: &LamellaOptions) -> Drawing {
     let mut drawing = Drawing::default();
     let height = 0.2 * settings.width;
     for layout in strip_layout(strips, settings, 0.5 * settings.width) {
-        let corner = layout.outline[0];
+        let start = layout.outline[0].x;
         drawing.lines.push(DrawnLine { layer: "cut".into(), points: layout.outline, closed: true });
         for mark in layout.marks {
             let points = mark.to_vec();
@@ -44,10 +45,13 @@ fn strip_drawing(strips: &[Lamella], settings: &LamellaOptions) -> Drawing {
             let layer = "label".into();
             drawing.labels.push(Label { layer, at, height, angle: 0.0, text });
         };
-        let left = geom_core::DVec3::new(-settings.width, 0.0, 0.0);
-        label(corner + left, format!("L{}", layout.lamella));
+        // In front of the strip, and beside the marks rather than on them.
+        if let Some((first, _)) = layout.labels.first() {
+            let front = DVec3::new(start - settings.width, first.y, 0.0);
+            label(front, format!("L{}", layout.lamella));
+        }
         for (at, vertex) in layout.labels {
-            label(at, format!("{vertex}"));
+            label(at + DVec3::X * 0.5 * height, format!("{vertex}"));
         }
     }
     drawing
