@@ -63,9 +63,9 @@ pub enum NetWarning {
     PlanarFaces { count: usize, first: usize },
     /// A boundary polygon that an exact net near the input cannot have.
     #[error(
-        "the boundary moves by up to {moved:.1e} edge lengths so that the net can be exact: its polygon prescribes the tangent planes along it ({angle_deg:.1} degrees off the faces in the mean) and an alternating product of {product:.3} around a loop, which must be 1; move its vertices onto a smoother curve, or let them slide along it (boundary glide)"
+        "the boundary moves by up to {moved:.1e} edge lengths so that the net can be exact: its polygon prescribes the tangent planes along it ({angle_deg:.1} degrees off the faces in the mean) and around a loop an alternating product that is off from 1 by {excess:.1e}; move its vertices onto a smoother curve, or let them slide along it (boundary glide)"
     )]
-    BoundaryPrescribed { angle_deg: f64, product: f64, moved: f64 },
+    BoundaryPrescribed { angle_deg: f64, excess: f64, moved: f64 },
     /// No alternating colouring.
     #[error(
         "vertices cannot be coloured alternately around some hole (an odd number of edges leads around it): the shape parameters are unique and no common factor can be chosen"
@@ -78,8 +78,8 @@ impl NetWarning {
     #[must_use]
     pub fn boundary(net: &QuadNet, moved: f64) -> Self {
         let BoundaryPolygon { closing, plane_angle } = BoundaryPolygon::new(net);
-        let (angle_deg, product) = (plane_angle.to_degrees(), closing.exp());
-        Self::BoundaryPrescribed { angle_deg, product, moved }
+        let (angle_deg, excess) = (plane_angle.to_degrees(), closing.exp_m1());
+        Self::BoundaryPrescribed { angle_deg, excess, moved }
     }
 }
 
