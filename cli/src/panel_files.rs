@@ -5,7 +5,7 @@ use exchange::{Drawing, DrawnLine, Group, Label, LengthUnit, Mesh, Model, NamedS
 use geom_core::DVec3;
 use paneling::{FlatPanel, FlatSheets, Mold, PanelRow, PanelSet, Paneling};
 use serde::Serialize;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 /// How well the panels of one paneling meet.
 #[derive(Serialize)]
@@ -57,9 +57,28 @@ struct PanelingFile<'a> {
 pub(crate) const PANEL_OUTPUTS: [&str; 8] =
     ["glb", "obj", "csv", "ron", "step", "stp", "svg", "dxf"];
 
-/// The bytes of `path`: panels, their table, molds, or flat outlines, by its extension. `sheet` is
-/// width and height of the sheets for flat outlines.
+/// The files of an output `path`: panels, their table, molds, or flat outlines, by its extension,
+/// and beside the panels of an OBJ file the colours of their molds. `sheet` is width and height of
+/// the sheets for flat outlines.
 pub(crate) fn encode(
+    path: &Path,
+    set: &PanelSet,
+    paneling: &Paneling,
+    unit: &LengthUnit,
+    sheet: Option<[f64; 2]>,
+) -> Result<Vec<(PathBuf, Vec<u8>)>, Failure> {
+    if exchange::extension_of(path) == "obj" {
+        let library = path.with_extension("mtl");
+        let name = library.file_name().unwrap_or_default().to_string_lossy();
+        let [panels, materials] =
+            exchange::write_obj_and_materials(&[panels_mesh(set, paneling)], &name);
+        return Ok(vec![(path.to_owned(), panels.into_bytes()), (library, materials.into_bytes())]);
+    }
+    let bytes = encode_one(path, set, paneling, unit, sheet)?;
+    Ok(vec![(path.to_owned(), bytes)])
+}
+
+fn encode_one(
     path: &Path,
     set: &PanelSet,
     paneling: &Paneling,

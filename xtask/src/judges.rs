@@ -79,6 +79,18 @@ const CASES: &[Case] = &[
     .asymptotic()
     .and_glb(),
     Case::step(
+        "gridshell across inflections, curves from normals, G2 joins",
+        &[
+            "asymptotic",
+            "fixtures/asymptotic/hyperbolic-enneper.obj",
+            "--from-net",
+            "--joins",
+            "g2",
+            "-o",
+            "{out}/a.step",
+        ],
+    ),
+    Case::step(
         "hyperbolic net of a helicoid",
         &["hnet", "fixtures/nets/helicoid.obj", "-o", "{out}/a.step", "-o", "{out}/a.glb"],
     )

@@ -83,7 +83,7 @@ impl Demo {
             outcome.files.push((path.clone(), bytes));
         }
         for path in [panels_glb, panels_csv, molds] {
-            outcome.files.push((path.clone(), cut.encode(path, &model.unit)?));
+            outcome.files.extend(cut.encode(path, &model.unit)?);
         }
         let pages = ReportArgs { report: Some(page.clone()), figures: None };
         report_support::add_files(&mut outcome, &pages, context, report)?;
@@ -170,7 +170,7 @@ impl Panelings {
         Ok(())
     }
 
-    fn encode(&self, path: &Path, unit: &LengthUnit) -> Result<Vec<u8>, Failure> {
+    fn encode(&self, path: &Path, unit: &LengthUnit) -> Result<Vec<(PathBuf, Vec<u8>)>, Failure> {
         let (set, paneling) = &self.after;
         encode(path, set, paneling, unit, None)
     }

@@ -230,11 +230,11 @@ impl Panel {
         outcome.summary = summary(&set, &result, &unit);
         for path in self.output {
             let sheet = options.sheet.map(|s| s.0);
-            let bytes = encode(&path, &set, paneling, &unit, sheet)?;
+            let files = encode(&path, &set, paneling, &unit, sheet)?;
             if ["svg", "dxf"].contains(&exchange::extension_of(&path).as_str()) {
                 outcome.warnings.extend(not_unrolled(paneling, &path));
             }
-            outcome.files.push((path, bytes));
+            outcome.files.extend(files);
         }
         if self.report.wanted() {
             let bounds = [options.max_kink_deg, options.max_gap];

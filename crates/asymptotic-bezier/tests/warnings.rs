@@ -5,8 +5,9 @@
 mod common;
 
 use asymptotic_bezier::{
-    AsymptoticWarning, BoundaryOptions, CornerData, Curvatures, PatchCheck, PatchOptions, Place,
-    TorsionHandle, doubt_signs, fill_patch, solve_quadrilateral, solve_quartic_quadrilateral,
+    AsymptoticError, AsymptoticWarning, BoundaryOptions, CornerData, Curvatures, PatchCheck,
+    PatchOptions, Place, TorsionHandle, doubt_signs, fill_patch, solve_quadrilateral,
+    solve_quartic_quadrilateral,
 };
 use common::reference_set;
 use geom_core::DVec3;
@@ -108,4 +109,13 @@ fn quartics_need_exact_data() {
     let flat = rounded.map_points(|p| DVec3::new(p.x, p.y, 0.0));
     let error = solve_quartic_quadrilateral(&flat).unwrap_err().to_string();
     assert!(error.starts_with("curve 1: the corner planes at both ends are parallel"), "{error}");
+}
+
+/// Data that no run of ours has reached, but whose sentences a user may meet.
+#[test]
+fn rare_messages_name_the_place_and_the_remedy() {
+    let fold = AsymptoticWarning::JointFold { place: Place::Patch(3), shared: 2 }.to_string();
+    assert!(fold.starts_with("patch 3: ") && fold.contains("G1"), "{fold}");
+    let gap = AsymptoticError::NotClosed { place: Place::NetCurve(7), gap: 2e-3 }.to_string();
+    assert!(gap.starts_with("net curve 7: ") && gap.contains("refine the net"), "{gap}");
 }

@@ -49,7 +49,7 @@ pub use model::{
     extension_of, read_model,
 };
 pub use net::{Net, read_net, write_net};
-pub use obj::{read_obj, write_obj};
+pub use obj::{read_obj, write_obj, write_obj_and_materials};
 pub use off::read_off;
 pub use ply::{read_ply, write_ply};
 pub use ron_text::{from_ron, read_ron, to_ron};

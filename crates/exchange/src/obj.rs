@@ -1,6 +1,7 @@
 //! Wavefront OBJ: polygons with groups, polylines and points. Texture coordinates, normals and
 //! materials are skipped when reading; free-form curves of degree 1 are polylines.
 
+use crate::color::{display, palette};
 use crate::error::ReadError;
 use crate::mesh::{Group, Mesh};
 use geom_core::DVec3;
@@ -222,6 +223,22 @@ pub fn write_obj(meshes: &[Mesh]) -> String {
     text
 }
 
+/// OBJ text as [`write_obj`] gives it that names a library of materials, and that library: one
+/// material per group with its colour (display values, as programs expect them).
+#[must_use]
+pub fn write_obj_and_materials(meshes: &[Mesh], library: &str) -> [String; 2] {
+    let mut materials = String::new();
+    for mesh in meshes {
+        for (g, group) in mesh.groups.iter().enumerate() {
+            let [r, g, b] =
+                group.color.unwrap_or_else(|| palette(g)).map(|c| display(f64::from(c)));
+            let name = one_line(&group.name);
+            let _ = writeln!(materials, "newmtl {name}\nKd {r:.4} {g:.4} {b:.4}");
+        }
+    }
+    [format!("mtllib {}\n{}", one_line(library), write_obj(meshes)), materials]
+}
+
 fn write_mesh(text: &mut String, mesh: &Mesh, base: usize) {
     // Writing into a `String` cannot fail.
     if !mesh.name.is_empty() {
@@ -280,6 +297,10 @@ mod tests {
         assert!(warnings.is_empty());
         let written = write_obj(std::slice::from_ref(&mesh));
         assert!(written.contains("g left\nusemtl left\nf 1 2 3 4\ng right\nusemtl right\n"));
+        let [with, materials] = write_obj_and_materials(std::slice::from_ref(&mesh), "a.mtl");
+        assert_eq!(with, format!("mtllib a.mtl\n{written}"));
+        assert!(materials.starts_with("newmtl left\nKd 0.0000 0.4470 0.6980\nnewmtl right\nKd "));
+        assert_eq!(read_obj(&with).unwrap().0, mesh);
         assert_eq!(read_obj(&written).unwrap(), (mesh, warnings));
     }
 
