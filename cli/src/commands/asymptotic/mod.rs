@@ -21,7 +21,7 @@ use std::str::FromStr;
 /// Arguments of `asymptotic`.
 #[derive(Debug, clap::Args)]
 #[command(
-    after_help = "Example:\n  umbilic asymptotic fixtures/asymptotic/catenoid.ron -o patch.step -o patch.glb"
+    after_help = "Examples:\n  umbilic asymptotic fixtures/asymptotic/catenoid.ron -o patch.step -o patch.glb\n  umbilic hnet fixtures/nets/enneper.obj -o net.ron\n  umbilic asymptotic net.ron --from-net --joins g2 -o shell.step --report shell.html"
 )]
 pub(crate) struct Asymptotic {
     /// Corner data or a net of curves (RON), polylines of the curves (OBJ), or with --from-net an

@@ -6,7 +6,6 @@
 //! matrix that belong to one run stand side by side. The padding adds zeros to what stands there.
 
 use pulp::{Simd, WithSimd};
-use std::ops::Range;
 
 /// Consecutive positions of an element's sorted columns.
 #[derive(Clone, Copy, Debug)]
@@ -36,7 +35,7 @@ const PADDING: u32 = 8;
 #[derive(Clone, Copy)]
 pub(crate) enum Targets<'a> {
     /// Band storage: entry `(i, j)` stands at `j · stride + i`.
-    Band { stride: usize },
+    Band { stride: usize, positions: &'a [u32] },
     /// For each column `b` of the element and each run from its own on: where the entry of the
     /// run's first row (of row `b` in its own run) stands.
     Columns(&'a [u32]),
@@ -46,16 +45,9 @@ impl Targets<'_> {
     /// Where the entry of the first row of run `other` and column `c` of run `own` stands; `before` is
     /// the number of table entries of the columns of earlier runs.
     #[inline(always)]
-    fn of(
-        self,
-        (runs, positions): (&[Run], &[u32]),
-        before: usize,
-        own: usize,
-        c: usize,
-        other: usize,
-    ) -> usize {
+    fn of(self, runs: &[Run], before: usize, own: usize, c: usize, other: usize) -> usize {
         match self {
-            Targets::Band { stride } => {
+            Targets::Band { stride, positions } => {
                 let column = positions[runs[own].begin as usize + c] as usize;
                 column * stride + positions[runs[other].begin as usize] as usize
             }
@@ -68,45 +60,24 @@ impl Targets<'_> {
     }
 }
 
-/// A stretch of columns of the matrix, which one thread fills.
-pub(crate) struct Columns<'a> {
-    /// Positions of the columns.
-    pub(crate) range: Range<u32>,
-    /// Where the first of them stands among all values.
-    pub(crate) base: usize,
-    pub(crate) values: &'a mut [f64],
-}
-
-impl Columns<'_> {
-    /// The columns of a run that are among these; `first` is the position of the run's first.
-    pub(super) fn of_run(&self, first: u32, run: Run) -> Range<usize> {
-        let clip = |end: u32| end.saturating_sub(first).min(run.end - run.begin) as usize;
-        clip(self.range.start)..clip(self.range.end)
-    }
-}
-
-/// Adds the lower triangle of `XᵀX` to some columns of the matrix and puts `Xᵀr` into `products`,
-/// by packed column; `x` holds packed rows of length `stride`.
-///
-/// Every entry gets the same sum whichever columns are done together.
-pub(crate) struct AddGram<'a, 'v> {
+/// Adds the lower triangle of `XᵀX` to the matrix and puts `Xᵀr` into `products`, by packed column;
+/// `x` holds packed rows of length `stride`.
+pub(crate) struct AddGram<'a> {
     pub(crate) x: &'a [f64],
     pub(crate) stride: usize,
     pub(crate) runs: &'a [Run],
-    /// Positions of the element's columns.
-    pub(crate) positions: &'a [u32],
     pub(crate) targets: Targets<'a>,
     pub(crate) residuals: &'a [f64],
-    pub(crate) columns: &'a mut Columns<'v>,
+    pub(crate) values: &'a mut [f64],
     pub(crate) products: &'a mut Vec<f64>,
 }
 
-impl WithSimd for AddGram<'_, '_> {
+impl WithSimd for AddGram<'_> {
     type Output = ();
 
     #[inline(always)]
     fn with_simd<S: Simd>(self, simd: S) {
-        let Self { x, stride, runs, positions, targets, residuals, columns, products } = self;
+        let Self { x, stride, runs, targets, residuals, values, products } = self;
         products.clear();
         products.resize(stride, 0.0);
         for (row, &r) in x.chunks_exact(stride).zip(residuals) {
@@ -117,27 +88,24 @@ impl WithSimd for AddGram<'_, '_> {
             }
         }
         if residuals.len() <= FEW_ROWS {
-            return add_few_rows(x, stride, (runs, positions), targets, columns);
+            return add_few_rows(x, stride, runs, targets, values);
         }
         let lanes = S::F64_LANES;
         // Number of targets of the columns of earlier runs.
         let mut before = 0;
         for (own, run) in runs.iter().enumerate() {
             let from_here = runs.len() - own;
-            let range = columns.of_run(positions[run.begin as usize], *run);
-            for c in range.clone().step_by(2) {
-                let two = (range.end - c).min(2);
+            for c in (0..run.len()).step_by(2) {
+                let columns = (run.len() - c).min(2);
                 for (other, rows) in runs.iter().enumerate().skip(own) {
                     let mut to = [0; 2];
-                    for (q, to) in to[..two].iter_mut().enumerate() {
-                        let at = targets.of((runs, positions), before, own, c + q, other);
-                        // The rows above the diagonal may stand before the first value.
-                        *to = at.wrapping_sub(columns.base);
+                    for (q, to) in to[..columns].iter_mut().enumerate() {
+                        *to = targets.of(runs, before, own, c + q, other);
                     }
-                    let pair = Pair { at: run.at as usize + c, targets: &to[..two] };
+                    let pair = Pair { at: run.at as usize + c, targets: &to[..columns] };
                     let (first, diagonal) =
                         if other == own { (c / lanes * lanes, Some(c)) } else { (0, None) };
-                    add_products(simd, (x, stride), *rows, first, diagonal, pair, columns.values);
+                    add_products(simd, (x, stride), *rows, first, diagonal, pair, values);
                 }
             }
             before += run.len() * from_here;
@@ -150,21 +118,14 @@ const FEW_ROWS: usize = 2;
 
 /// Adds the products of a row or two entry by entry.
 #[inline(always)]
-fn add_few_rows(
-    x: &[f64],
-    stride: usize,
-    (runs, positions): (&[Run], &[u32]),
-    targets: Targets<'_>,
-    columns: &mut Columns<'_>,
-) {
+fn add_few_rows(x: &[f64], stride: usize, runs: &[Run], targets: Targets<'_>, values: &mut [f64]) {
     let mut before = 0;
     for (own, run) in runs.iter().enumerate() {
-        for c in columns.of_run(positions[run.begin as usize], *run) {
+        for c in 0..run.len() {
             for (other, rows) in runs.iter().enumerate().skip(own) {
                 let first = if other == own { c } else { 0 };
-                let begin = targets.of((runs, positions), before, own, c, other) + first;
-                let begin = begin - columns.base;
-                let to = &mut columns.values[begin..begin + rows.len() - first];
+                let begin = targets.of(runs, before, own, c, other) + first;
+                let to = &mut values[begin..begin + rows.len() - first];
                 for row in x.chunks_exact(stride) {
                     let factor = row[run.at as usize + c];
                     let from = &row[rows.at as usize + first..];
@@ -260,20 +221,17 @@ fn add_tile<S: Simd, const R: usize>(
         }
     }
     for (sums, &target) in sums.iter().zip(pair.targets) {
-        let begin = target.wrapping_add(k);
-        let end = begin.wrapping_add(R * S::F64_LANES);
-        if let Some(to) = values.get_mut(begin..end) {
+        let begin = target + k;
+        if let Some(to) = values.get_mut(begin..begin + R * S::F64_LANES) {
             let to = &mut S::as_mut_simd_f64s(to).0[..R];
             for r in 0..R {
                 to[r] = simd.add_f64s(to[r], sums[r]);
             }
         } else {
-            // Rows above the diagonal or padding lie outside.
+            // The padding would reach past the end of the matrix.
             let numbers: &[f64] = pulp::bytemuck::cast_slice(sums);
-            for (r, &value) in numbers[..numbers.len().min(rows.len() - k)].iter().enumerate() {
-                if let Some(to) = values.get_mut(begin.wrapping_add(r)) {
-                    *to += value;
-                }
+            for (to, &value) in values[begin..target + rows.len()].iter_mut().zip(numbers) {
+                *to += value;
             }
         }
     }
@@ -342,24 +300,15 @@ mod tests {
                 let mut values = vec![0.5; size * size];
                 let residuals = [1.0, -2.0, 3.0, 0.5, 4.0, -1.0, 2.0, 0.25, 8.0];
                 let mut products = vec![f64::NAN; 3];
-                // In two stretches of columns, the second of which begins within a run.
-                let split = size / 2 + 1;
-                let (left, right) = values.split_at_mut((split * (band + 1)).min(size * size));
-                let right_base = left.len();
-                for (range, base, values) in
-                    [(0..split as u32, 0, left), (split as u32..u32::MAX, right_base, right)]
-                {
-                    pulp::Arch::new().dispatch(AddGram {
-                        x: &x,
-                        stride,
-                        runs: &runs,
-                        positions: &positions,
-                        targets: Targets::Band { stride: band },
-                        residuals: &residuals[..rows],
-                        columns: &mut Columns { range, base, values },
-                        products: &mut products,
-                    });
-                }
+                pulp::Arch::new().dispatch(AddGram {
+                    x: &x,
+                    stride,
+                    runs: &runs,
+                    targets: Targets::Band { stride: band, positions: &positions },
+                    residuals: &residuals[..rows],
+                    values: &mut values,
+                    products: &mut products,
+                });
                 for run in &runs {
                     for c in run.begin..run.end {
                         let c = c as usize;

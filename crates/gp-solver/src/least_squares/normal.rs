@@ -2,9 +2,7 @@
 
 use std::ops::Range;
 
-use rayon::prelude::*;
-
-use super::gram::{AddGram, Columns, Run, Targets};
+use super::gram::{AddGram, Run, Targets};
 use crate::error::SolverError;
 use crate::linear::{Factor, Storage};
 use crate::options::Factorization;
@@ -46,22 +44,7 @@ pub(crate) struct NormalPlan {
     pub(crate) variable: Vec<usize>,
     blocks: Vec<BlockPlan>,
     stride: Option<usize>,
-    /// Stretches of columns of about the same work, one after the other.
-    stretches: Vec<Range<u32>>,
 }
-
-/// A residual block at an iterate.
-pub(crate) struct RowValues<'a> {
-    pub(crate) block: usize,
-    pub(crate) elements: &'a Elements,
-    pub(crate) jacobian: &'a [f64],
-    pub(crate) residuals: &'a [f64],
-    /// Whether its part of the matrix is wanted besides the gradient.
-    pub(crate) with_matrix: bool,
-}
-
-/// Multiplications that are worth a thread.
-const WORTH_A_THREAD: f64 = 2e5;
 
 /// Memory of the element products.
 #[derive(Default)]
@@ -220,8 +203,7 @@ impl NormalPlan {
                 None
             }
         };
-        let stretches = stretches(problem, &blocks, variable.len());
-        Ok((Self { variable, blocks, stride, stretches }, factor))
+        Ok((Self { variable, blocks, stride }, factor))
     }
 
     /// Number of free unknowns.
@@ -229,100 +211,52 @@ impl NormalPlan {
         self.variable.len()
     }
 
-    /// Adds `Jᵀr` of residual blocks to the gradient and, where a block wants it, `JᵀJ` to the matrix
-    /// values. Threads fill stretches of columns; the sums do not depend on where these are cut.
+    /// Adds `Jᵀr` of a block to the gradient and, if given, `JᵀJ` to the matrix values.
     pub(crate) fn add_rows(
         &self,
-        blocks: &[RowValues<'_>],
+        block: usize,
+        elements: &Elements,
+        jacobian: &[f64],
+        residuals: &[f64],
         gradient: &mut [f64],
-        values: &mut [f64],
-        diagonal_slot: impl Fn(usize) -> usize,
-        scratch: &mut Vec<Scratch>,
-    ) {
-        let mut tasks = Vec::with_capacity(self.stretches.len());
-        let (mut gradient, mut values, mut base) = (gradient, values, 0);
-        scratch.resize_with(self.stretches.len(), Scratch::default);
-        for (range, scratch) in self.stretches.iter().zip(scratch) {
-            let columns = range.len();
-            let end = if columns == gradient.len() {
-                base + values.len()
-            } else {
-                diagonal_slot(range.end as usize)
-            };
-            let (own, others) = std::mem::take(&mut gradient).split_at_mut(columns);
-            let (stretch, rest) = std::mem::take(&mut values).split_at_mut(end - base);
-            tasks.push((Columns { range: range.clone(), base, values: stretch }, own, scratch));
-            (gradient, values, base) = (others, rest, end);
-        }
-        let fill = |(mut columns, gradient, scratch): (Columns<'_>, &mut [f64], &mut Scratch)| {
-            for rows in blocks {
-                self.add_stretch(rows, &mut columns, gradient, scratch);
-            }
-        };
-        match tasks.len() {
-            1 => tasks.into_iter().for_each(fill),
-            _ => tasks.into_par_iter().for_each(fill),
-        }
-    }
-
-    /// The part of [`Self::add_rows`] that goes to some columns; `gradient` is theirs.
-    fn add_stretch(
-        &self,
-        rows: &RowValues<'_>,
-        columns: &mut Columns<'_>,
-        gradient: &mut [f64],
+        mut values: Option<&mut [f64]>,
         scratch: &mut Scratch,
     ) {
-        let plan = &self.blocks[rows.block];
+        let plan = &self.blocks[block];
         let arch = pulp::Arch::new();
-        let (start, end) = (columns.range.start, columns.range.end);
         for e in 0..plan.len() {
             let range = plan.range(e);
-            let positions = &plan.position[range.clone()];
-            let numbers = rows.elements.rows(e);
-            let (Some(&first), Some(&last)) = (positions.first(), positions.last()) else {
-                continue;
-            };
-            if last < start || first >= end || numbers.is_empty() {
+            let local = &plan.local[range.clone()];
+            let positions = &plan.position[range];
+            let width = elements.columns(e).len();
+            let rows = elements.rows(e);
+            if local.is_empty() || rows.is_empty() {
                 continue;
             }
-            let width = rows.elements.columns(e).len();
-            let jacobian = &rows.jacobian[rows.elements.jacobian_range(e)];
-            let residuals = &rows.residuals[numbers];
-            if !rows.with_matrix {
-                let own = positions.partition_point(|p| *p < start)
-                    ..positions.partition_point(|p| *p < end);
-                let local = &plan.local[range];
+            let jacobian = &jacobian[elements.jacobian_range(e)];
+            let residuals = &residuals[rows];
+            let Some(values) = values.as_deref_mut() else {
                 for (row, &r) in jacobian.chunks_exact(width).zip(residuals) {
-                    for (&c, &p) in local[own.clone()].iter().zip(&positions[own.clone()]) {
-                        gradient[(p - start) as usize] += row[c as usize] * r;
+                    for (&c, &p) in local.iter().zip(positions) {
+                        gradient[p as usize] += row[c as usize] * r;
                     }
                 }
                 continue;
-            }
+            };
             let runs = plan.runs(e);
             let stride = runs[runs.len() - 1].packed_end() as usize;
             scratch.pack(plan.pieces(e), jacobian.chunks_exact(width), stride);
             let targets = match self.stride {
-                Some(stride) => Targets::Band { stride },
+                Some(stride) => Targets::Band { stride, positions },
                 None => Targets::Columns(plan.targets(e)),
             };
             let (x, products) = (&scratch.packed, &mut scratch.product);
-            arch.dispatch(AddGram {
-                x,
-                stride,
-                runs,
-                positions,
-                targets,
-                residuals,
-                columns,
-                products,
-            });
+            arch.dispatch(AddGram { x, stride, runs, targets, residuals, values, products });
             for run in runs {
-                let first = positions[run.begin as usize];
-                for c in columns.of_run(first, *run) {
-                    let p = first as usize + c - start as usize;
-                    gradient[p] += scratch.product[run.at as usize + c];
+                let first = positions[run.begin as usize] as usize;
+                let sums = &scratch.product[run.at as usize..][..run.len()];
+                for (to, &sum) in gradient[first..].iter_mut().zip(sums) {
+                    *to += sum;
                 }
             }
         }
@@ -406,38 +340,6 @@ impl NormalPlan {
             })
         })
     }
-}
-
-/// Cuts the columns of the matrix into stretches of about the same number of multiplications.
-fn stretches(problem: &Problem<'_>, blocks: &[BlockPlan], size: usize) -> Vec<Range<u32>> {
-    let mut work = vec![0.0; size];
-    for (block, plan) in problem.blocks.iter().zip(blocks) {
-        let Block::Residual(rows) = block else { continue };
-        for e in 0..plan.len() {
-            let positions = plan.positions(e);
-            let rows = rows.elements().rows(e).len();
-            for (k, &p) in positions.iter().enumerate() {
-                work[p as usize] += (rows * (positions.len() - k)) as f64;
-            }
-        }
-    }
-    let total: f64 = work.iter().sum();
-    let threads = rayon::current_num_threads() as f64;
-    // More stretches than threads even out what the work of an element really is.
-    let count =
-        (total / WORTH_A_THREAD).min(if threads > 1.0 { 4.0 * threads } else { 1.0 }).max(1.0);
-    let share = total / count.floor();
-    let mut out = Vec::new();
-    let (mut begin, mut sum) = (0, 0.0);
-    for (p, work) in work.iter().enumerate() {
-        sum += work;
-        if sum >= share * (out.len() + 1) as f64 && p + 1 < size {
-            out.push(begin..p as u32 + 1);
-            begin = p as u32 + 1;
-        }
-    }
-    out.push(begin..size as u32);
-    out
 }
 
 /// Whether a block's matrix part is the same at every iterate.

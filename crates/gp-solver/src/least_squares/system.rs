@@ -2,11 +2,11 @@
 
 use std::time::Instant;
 
-use super::normal::{NormalPlan, RowValues, Scratch, is_constant};
+use super::normal::{NormalPlan, Scratch, is_constant};
 use crate::error::SolverError;
 use crate::linear::{Factor, SymmetricPattern};
 use crate::options::Factorization;
-use crate::problem::{Block, Elements, Problem, Quantity};
+use crate::problem::{Block, Problem, Quantity};
 use crate::report::{Term, Timings};
 
 /// Residuals and derivatives of one block.
@@ -16,18 +16,6 @@ struct BlockValues {
     /// Jacobian of a residual block, Hessians of an energy block.
     derivatives: Vec<f64>,
     linearized: bool,
-}
-
-impl BlockValues {
-    fn rows<'b>(
-        &'b self,
-        block: usize,
-        elements: &'b Elements,
-        with_matrix: bool,
-    ) -> RowValues<'b> {
-        let (jacobian, residuals) = (&self.derivatives, &self.residuals);
-        RowValues { block, elements, jacobian, residuals, with_matrix }
-    }
 }
 
 /// A planned problem: patterns, ordering and symbolic factorisation are made once, then the
@@ -52,7 +40,7 @@ pub struct System<'a> {
     trial: Vec<f64>,
     shift: Vec<f64>,
     step: Vec<f64>,
-    scratch: Vec<Scratch>,
+    scratch: Scratch,
     energy: f64,
     factorizations: usize,
     timings: Timings,
@@ -106,7 +94,7 @@ impl<'a> System<'a> {
             trial: vec![0.0; problem.blocks.len()],
             shift: vec![0.0; n],
             step: vec![0.0; n],
-            scratch: vec![Scratch::default()],
+            scratch: Scratch::default(),
             energy: f64::NAN,
             factorizations: 0,
             timings: Timings { plan: begin.elapsed(), ..Timings::default() },
@@ -265,15 +253,20 @@ impl<'a> System<'a> {
         self.matrix.fill(0.0);
         // Zero rows are not worth a thought: the gradient is formed with the rest.
         let mut unused = vec![0.0; self.plan.size()];
-        let constant = |b: &usize| is_constant(&self.problem.blocks[*b]);
-        let rows: Vec<RowValues<'_>> = (0..self.values.len())
-            .filter(constant)
-            .map(|b| self.values[b].rows(b, self.problem.blocks[b].elements(), true))
-            .collect();
-        let diagonal = |i| self.factor.diagonal_slot(i);
-        self.plan.add_rows(&rows, &mut unused, &mut self.matrix, diagonal, &mut self.scratch);
-        for (block, values) in self.problem.blocks.iter().zip(&mut self.values) {
-            values.linearized |= is_constant(block);
+        for (b, block) in self.problem.blocks.iter().enumerate() {
+            if is_constant(block) {
+                let values = &mut self.values[b];
+                self.plan.add_rows(
+                    b,
+                    block.elements(),
+                    &values.derivatives,
+                    &values.residuals,
+                    &mut unused,
+                    Some(&mut self.matrix),
+                    &mut self.scratch,
+                );
+                values.linearized = true;
+            }
         }
         let entries = self.matrix.iter().zip(0..).filter(|(value, _)| **value != 0.0);
         self.constant = entries.map(|(&value, slot)| (slot, value)).collect();
@@ -290,33 +283,28 @@ impl<'a> System<'a> {
             self.matrix[slot as usize] = value;
         }
         self.gradient.fill(0.0);
-        let blocks = self.problem.blocks.iter().enumerate();
-        let rows: Vec<RowValues<'_>> = blocks
-            .clone()
-            .filter(|(_, block)| matches!(block, Block::Residual(_)))
-            .map(|(b, block)| {
-                let values = &self.values[b];
-                values.rows(b, block.elements(), !values.linearized)
-            })
-            .collect();
-        let diagonal = |i| self.factor.diagonal_slot(i);
-        self.plan.add_rows(
-            &rows,
-            &mut self.gradient,
-            &mut self.matrix,
-            diagonal,
-            &mut self.scratch,
-        );
-        for (b, block) in blocks.filter(|(_, block)| matches!(block, Block::Energy(_))) {
-            self.plan.add_energy(
-                b,
-                block.elements(),
-                &self.values[b].derivatives,
-                &self.values[b].residuals,
-                &mut self.gradient,
-                &mut self.matrix,
-                &mut self.scratch[0],
-            );
+        for (b, block) in self.problem.blocks.iter().enumerate() {
+            let values = &self.values[b];
+            match block {
+                Block::Residual(_) => self.plan.add_rows(
+                    b,
+                    block.elements(),
+                    &values.derivatives,
+                    &values.residuals,
+                    &mut self.gradient,
+                    (!values.linearized).then_some(&mut self.matrix[..]),
+                    &mut self.scratch,
+                ),
+                Block::Energy(_) => self.plan.add_energy(
+                    b,
+                    block.elements(),
+                    &values.derivatives,
+                    &values.residuals,
+                    &mut self.gradient,
+                    &mut self.matrix,
+                    &mut self.scratch,
+                ),
+            }
         }
         for i in 0..self.plan.size() {
             let a = self.matrix[self.factor.diagonal_slot(i)];
