@@ -34,6 +34,15 @@ fn net_files_of_hnet_are_filled_across_their_inflections() {
 }
 
 #[test]
+fn meshes_along_other_lines_are_refused() {
+    // Curvature lines of a torus, and a mesh that is only roughly asymptotic.
+    let torus = ["asymptotic", "fixtures/quads/torus.obj", "--from-net"];
+    refused(&torus, "a.step", &["do not twist", "use a mesh along asymptotic lines"]);
+    let rough = ["asymptotic", "fixtures/nets/enneper.obj", "--from-net"];
+    refused(&rough, "a.step", &["net curve", "umbilic hnet"]);
+}
+
+#[test]
 fn gaussian_curvature_at_a_corner_is_a_wish_on_the_command_line_and_in_a_config() {
     let data = "fixtures/asymptotic/catenoid.ron";
     let free = metrics(&[data])["strain_energy"].as_f64().expect("a number");

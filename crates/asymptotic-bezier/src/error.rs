@@ -125,12 +125,17 @@ pub enum AsymptoticError {
         "the curves do not fall into two families (an inner vertex of odd valence, or a net that cannot be coloured), so no normals with K < 0 run along them; make the curves from curvatures"
     )]
     NoFamilies,
+    /// Faces without the twist of an asymptotic net.
+    #[error(
+        "the faces at {share:.0} % of the vertices do not twist as asymptotic lines make them, so the surface is flat or the mesh runs along other lines; use a mesh along asymptotic lines"
+    )]
+    NoTwist { share: f64 },
     /// Least squares for the curves of a net.
     #[error("the curves of the net cannot be solved for ({0}); mend tangents and curvatures")]
     Curves(#[source] gp_solver::SolverError),
     /// A curve from normals that does not reach its end.
     #[error(
-        "{place}: no curve from normals reaches its end (gap {gap:.3e} chords); mend the tangents at its vertices or refine the net"
+        "{place}: no curve from normals reaches its end (gap {gap:.3e} chords); make the net exactly asymptotic first (umbilic hnet does), or refine it"
     )]
     NotClosed { place: Place, gap: f64 },
     /// Degree outside what the construction offers.

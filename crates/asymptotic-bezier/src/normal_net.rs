@@ -25,6 +25,11 @@ use crate::vertex::{PLANE_TOL, VertexFrame, curve_families, vertex_frames};
 
 /// Estimated torsions are kept above this share of their median: less is noise at flat places.
 const LEAST_TORSION: f64 = 0.05;
+/// Torsions times the longest chord below this are none.
+const FLAT: f64 = 1e-9;
+/// A net is refused if the faces at more than this share of its vertices twist the wrong way or not
+/// at all: between random twists half of them do.
+const MOST_WITHOUT_TWIST: f64 = 0.25;
 /// Weights of gaps and jumps, in chords, one after the other: a large one from the start would make
 /// the way long.
 const CLOSING: [f64; 3] = [10.0, 100.0, 1000.0];
@@ -46,7 +51,8 @@ const CLOSED: f64 = 1e-11;
 /// Solves for all curves of `net` as [`solve_boundary`](crate::solve_boundary) does, by normals.
 ///
 /// # Errors
-/// As there; [`AsymptoticError::NoFamilies`] where torsions cannot alternate around every vertex;
+/// As there; [`AsymptoticError::NoFamilies`] where torsions cannot alternate around every vertex,
+/// [`AsymptoticError::NoTwist`] for meshes along other lines, and
 /// [`AsymptoticError::NotClosed`] where no such curves are found.
 pub(crate) fn solve_by_normals(
     net: &AsymptoticNet,
@@ -63,7 +69,16 @@ pub(crate) fn solve_by_normals(
     }
     let frames = vertex_frames(&mut net, PLANE_TOL)?;
     let signs = arm_signs(&net, &frames);
-    let (orientation, mut torsions) = one_sign(&bilinear_torsions(&net, &signs, &frames));
+    let estimated = bilinear_torsions(&net, &signs, &frames);
+    let (orientation, mut torsions) = one_sign(&estimated);
+    // A twist below rounding has no sign.
+    let size = net.curves.iter().map(|c| net.chord(c).length()).fold(0.0, f64::max);
+    let twists = |tau: &&f64| orientation * **tau * size > FLAT;
+    let without = estimated.len() - estimated.iter().filter(twists).count();
+    let share = without as f64 / estimated.len() as f64;
+    if share > MOST_WITHOUT_TWIST {
+        return Err(AsymptoticError::NoTwist { share: 100.0 * share });
+    }
     let handle = |v: usize| options.torsions.get(v).copied().unwrap_or_default().bounds();
     let bounds: Vec<[f64; 2]> = (0..torsions.len()).map(handle).collect();
     let mut held = vec![false; torsions.len()];

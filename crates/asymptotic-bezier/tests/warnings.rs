@@ -117,5 +117,5 @@ fn rare_messages_name_the_place_and_the_remedy() {
     let fold = AsymptoticWarning::JointFold { place: Place::Patch(3), shared: 2 }.to_string();
     assert!(fold.starts_with("patch 3: ") && fold.contains("G1"), "{fold}");
     let gap = AsymptoticError::NotClosed { place: Place::NetCurve(7), gap: 2e-3 }.to_string();
-    assert!(gap.starts_with("net curve 7: ") && gap.contains("refine the net"), "{gap}");
+    assert!(gap.starts_with("net curve 7: ") && gap.contains("umbilic hnet"), "{gap}");
 }
