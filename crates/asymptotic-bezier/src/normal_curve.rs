@@ -38,6 +38,8 @@ pub(crate) struct CurveEnd {
     pub(crate) length: f64,
     /// `r′` is this times the tangent, which is an unknown.
     pub(crate) speed: f64,
+    /// The same in units of the net, so that the growth of the normal has none.
+    pub(crate) relative_speed: f64,
 }
 
 /// The data of one curve, measured from its start.
@@ -78,7 +80,7 @@ impl NormalCurve {
     pub(crate) fn start(&self, x: &mut [f64; COLUMNS]) {
         let n = self.polygons(x).normal;
         let middle = ((n[1] + n[3]) * 4.0 - n[0] - n[4]) / 6.0;
-        x[OWN..].copy_from_slice(&middle.to_array());
+        x[OWN..].copy_from_slice(&self.ends[0].frame.map(|axis| middle.dot(axis)));
     }
 
     /// Control points of the normal, and of their derivatives by the unknowns where `slopes` wants
@@ -104,7 +106,7 @@ impl NormalCurve {
             // N₁ − N₀ turns the tangent plane about the tangent: 4 N₀ × (N₁ − N₀) = ± r′.
             let factor = [0.25, -0.25][e] * self.sign / length;
             let turn = velocity.cross(unit) * factor;
-            let grow = [0.25, -0.25][e] * end.speed * end.length;
+            let grow = [0.25, -0.25][e] * end.relative_speed * end.length;
             let growth = grow * growth;
             points[outer] = unit * length;
             points[inner] = unit * (length + growth) + turn;
@@ -124,9 +126,11 @@ impl NormalCurve {
             }
             slopes[LINE[e] + 2].normal[inner] = unit * grow;
         }
-        points[2] = DVec3::new(x[OWN], x[OWN + 1], x[OWN + 2]);
+        // In the frame of the start, so that turning the net turns the result and nothing else.
+        let axes = self.ends[0].frame;
+        points[2] = axes[0] * x[OWN] + axes[1] * x[OWN + 1] + axes[2] * x[OWN + 2];
         if let Some(slopes) = slopes {
-            for (k, axis) in [DVec3::X, DVec3::Y, DVec3::Z].into_iter().enumerate() {
+            for (k, axis) in axes.into_iter().enumerate() {
                 slopes[OWN + k].normal[2] = axis;
             }
         }
@@ -337,7 +341,12 @@ mod tests {
             let right = up.any_orthonormal_vector();
             [up, right, up.cross(right)]
         };
-        let end = |n: DVec3, length: f64| CurveEnd { frame: frame(n), length, speed: 1.3 };
+        let end = |n: DVec3, length: f64| CurveEnd {
+            frame: frame(n),
+            length,
+            speed: 1.3,
+            relative_speed: 0.7,
+        };
         let curve = NormalCurve {
             chord: DVec3::new(1.0, 0.2, 0.1),
             ends: [end(DVec3::new(0.1, 0.0, 1.0), 0.9), end(DVec3::new(0.0, 0.6, 1.0), 1.2)],
@@ -390,7 +399,10 @@ mod tests {
             (y[k], y[3 + k]) = (x[3 + k], x[k]);
             (y[6 + k], y[9 + k]) = (x[9 + k], x[6 + k]);
         }
-        let opposite = |e: CurveEnd| CurveEnd { speed: -e.speed, ..e };
+        let middle = curve.polygons(&x).normal[2];
+        y[OWN..].copy_from_slice(&end.frame.map(|axis| middle.dot(axis)));
+        let opposite =
+            |e: CurveEnd| CurveEnd { speed: -e.speed, relative_speed: -e.relative_speed, ..e };
         let turned = NormalCurve { ends: turned.ends.map(opposite), ..turned };
         let both = Continuation { curves: [(&curve, 0), (&turned, 1)] };
         let mut slopes = [[0.0; COLUMNS]; 2];

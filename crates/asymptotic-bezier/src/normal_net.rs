@@ -166,6 +166,8 @@ impl<'a> NormalNet<'a> {
             x: vec![0.0; tangents],
         };
         let lines = out.add_tangents();
+        let chords: f64 = net.curves.iter().map(|c| net.chord(c).length()).sum();
+        let unit = chords / net.curves.len() as f64;
         for (i, curve) in net.curves.iter().enumerate() {
             let mut columns = [0; COLUMNS];
             let ends = [0, 1].map(|e| {
@@ -180,9 +182,10 @@ impl<'a> NormalNet<'a> {
                 let speed = DATA_DEGREE as f64 * curve.arms[e].length();
                 let forward = [1.0, -1.0][e];
                 CurveEnd {
-                    frame: frame_of(frames, v),
+                    frame: out.frame_at(v),
                     length: torsions[v].abs().sqrt().recip(),
                     speed: forward * line.direction * speed,
+                    relative_speed: forward * line.direction * speed / unit,
                 }
             });
             for k in OWN..COLUMNS {
@@ -199,13 +202,22 @@ impl<'a> NormalNet<'a> {
         out
     }
 
+    /// Normal, direction of the first arm, and the direction across it.
+    fn frame_at(&self, v: usize) -> [DVec3; 3] {
+        let Some(frame) = &self.frames[v] else { return [DVec3::Z, DVec3::X, DVec3::Y] };
+        let (curve, end) = frame.arms[0];
+        let (up, arm) = (frame.normal, self.net.curves[curve].arms[end]);
+        let right = (arm - up * arm.dot(up)).normalize();
+        [up, right, up.cross(right)]
+    }
+
     /// Numbers the tangents: where two arms of a vertex are one line, they share one.
     fn add_tangents(&mut self) -> HashMap<(usize, usize), LineAtVertex> {
         let mut lines = HashMap::new();
         for (v, frame) in self.frames.iter().enumerate() {
             let Some(frame) = frame else { continue };
             let direction = |(i, e): (usize, usize)| self.net.curves[i].arms[e].normalize();
-            let [_, right, left] = frame_of(self.frames, v);
+            let [_, right, left] = self.frame_at(v);
             for (k, &arm) in frame.arms.iter().enumerate() {
                 if lines.contains_key(&arm) {
                     continue;
@@ -314,7 +326,7 @@ impl<'a> NormalNet<'a> {
     fn normals(&self) -> Vec<DVec3> {
         (0..self.net.positions.len())
             .map(|v| {
-                let [up, right, left] = frame_of(self.frames, v);
+                let [up, right, left] = self.frame_at(v);
                 (up + right * self.x[3 * v + 1] + left * self.x[3 * v + 2]).normalize()
             })
             .collect()
@@ -333,12 +345,6 @@ impl<'a> NormalNet<'a> {
 struct LineAtVertex {
     unknown: usize,
     direction: f64,
-}
-
-fn frame_of(frames: &[Option<VertexFrame>], v: usize) -> [DVec3; 3] {
-    let up = frames[v].as_ref().map_or(DVec3::Z, |f| f.normal);
-    let right = up.any_orthonormal_vector();
-    [up, right, up.cross(right)]
 }
 
 fn gather(x: &[f64], columns: &[usize]) -> [f64; COLUMNS] {

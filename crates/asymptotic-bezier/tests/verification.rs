@@ -8,6 +8,7 @@ use asymptotic_bezier::{
     solve_boundary, solve_quadrilateral,
 };
 use common::{catenoid, enneper, exact_net, reference_set, sampled_net};
+use geom_core::{DVec3, PolyMesh};
 
 #[test]
 fn good_sets_have_asymptotic_boundaries_and_no_warnings() {
@@ -159,6 +160,29 @@ fn nets_across_inflections_join_without_kinks() {
     // Normals are chosen without being asked for, because of the inflections.
     let (_, auto, _) = neck(CurveForm::Auto, Joins::G1);
     assert_eq!(auto, shell);
+}
+
+#[test]
+fn curves_from_normals_turn_and_grow_with_their_net() {
+    let mesh = sampled_net(catenoid, [-0.7, 0.8, -0.4, 0.5], [4, 4]);
+    let options = BoundaryOptions { form: CurveForm::Normals, ..Default::default() };
+    let curves = |map: &dyn Fn(DVec3) -> DVec3| {
+        let moved: Vec<DVec3> = mesh.positions().iter().map(|p| map(*p)).collect();
+        let faces: Vec<Vec<u32>> = mesh
+            .faces()
+            .map(|f| mesh.face_vertices(f).map(|v| v.index() as u32).collect())
+            .collect();
+        let moved = PolyMesh::new(moved, &faces).unwrap();
+        let net = AsymptoticNet::from_mesh(&moved).unwrap();
+        solve_boundary(&net, &options).unwrap().curves
+    };
+    let turn = geom_core::DMat3::from_axis_angle(DVec3::new(1.0, 2.0, -0.5).normalize(), 0.7);
+    let map = |p: DVec3| turn * p * 37.0 + DVec3::new(5.0, -3.0, 8.0);
+    for (before, after) in curves(&|p| p).iter().zip(&curves(&map)) {
+        for (p, q) in before.points().iter().zip(after.points()) {
+            assert!(map(*p).distance(*q) < 37.0 * 1e-10, "{}", map(*p).distance(*q));
+        }
+    }
 }
 
 /// Curves from normals have continuous curvature and derivatives of torsion, all that G2 joins need.

@@ -57,7 +57,7 @@ struct Options {
     /// inflections do not disturb (default: normals if a net made from positions needs them)
     #[arg(long, value_enum)]
     curves: Option<CurvesName>,
-    /// What the freedom of the boundary curves minimises
+    /// What the freedom of boundary curves made from curvatures minimises
     #[arg(long, value_enum)]
     boundary_energy: Option<EnergyName>,
     /// Take the input for a quad mesh along asymptotic lines and estimate its curves
