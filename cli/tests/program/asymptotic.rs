@@ -25,6 +25,12 @@ fn net_files_of_hnet_are_filled_across_their_inflections() {
     assert_eq!(plain["patches"], 144);
     assert!(plain["kink_max_deg"].as_f64().expect("a number") < 1e-8);
     assert_eq!(plain["warnings"], 0);
+    // Curves from normals have no choice of energy: said, and refused where both are asked for.
+    let out = folder.path().join("a.step").display().to_string();
+    let jerk = ["asymptotic", &net, "--from-net", "--boundary-energy", "jerk"];
+    let output = umbilic(&[&jerk[..], &["-o", &out]].concat());
+    assert!(message(&output).contains("--boundary-energy was not used"), "{}", message(&output));
+    refused(&[&jerk[..], &["--curves", "normals"]].concat(), "a.step", &["--boundary-energy"]);
     // Curves from curvatures have no way through the inflections.
     refused(
         &["asymptotic", &net, "--from-net", "--curves", "curvatures"],

@@ -138,6 +138,12 @@ impl Boundary {
     pub fn torsion_sign(&self, curve: usize, end: usize) -> f64 {
         self.signs[curve][end]
     }
+
+    /// Whether the curves were made from normals, of one degree and with an energy of their own.
+    #[must_use]
+    pub fn is_from_normals(&self) -> bool {
+        self.curves.iter().any(|c| c.normals().is_some())
+    }
 }
 
 /// One curve as an affine function of the torsions at its ends.

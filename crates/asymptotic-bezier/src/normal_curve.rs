@@ -18,7 +18,7 @@ pub(crate) const CURVE_DEGREE: usize = 2 * NORMAL_DEGREE - 1;
 /// tangent and the growth of the normal along it, and the middle control point of the normal.
 pub(crate) const COLUMNS: usize = 15;
 /// The first unknown of the line at an end.
-const LINE: [usize; 2] = [6, 9];
+pub(crate) const LINE: [usize; 2] = [6, 9];
 /// The first unknown of its own.
 pub(crate) const OWN: usize = 12;
 
@@ -51,6 +51,8 @@ pub(crate) struct NormalCurve {
     pub(crate) sign: f64,
     /// Whether it has to be straight.
     pub(crate) line: bool,
+    /// Orthonormal axes of its own unknowns: turning the net turns the result and nothing else.
+    axes: [DVec3; 3],
 }
 
 /// Control points of the normal and of `r′`.
@@ -76,11 +78,24 @@ const PRODUCTS: [(usize, usize, usize, f64); 10] = [
 ];
 
 impl NormalCurve {
+    pub(crate) fn new(chord: DVec3, ends: [CurveEnd; 2], sign: f64, line: bool) -> Self {
+        let along = chord.normalize();
+        let normal = ends[0].frame[0] + ends[1].frame[0];
+        let up = (normal - along * normal.dot(along)).try_normalize();
+        let up = up.unwrap_or_else(|| along.any_orthonormal_vector());
+        Self { chord, ends, sign, line, axes: [along, up, along.cross(up)] }
+    }
+
+    /// Mean of the lengths of the normals at the ends.
+    pub(crate) fn length(&self) -> f64 {
+        0.5 * (self.ends[0].length + self.ends[1].length)
+    }
+
     /// The middle control point for which the normals have no fourth difference.
     pub(crate) fn start(&self, x: &mut [f64; COLUMNS]) {
         let n = self.polygons(x).normal;
         let middle = ((n[1] + n[3]) * 4.0 - n[0] - n[4]) / 6.0;
-        x[OWN..].copy_from_slice(&self.ends[0].frame.map(|axis| middle.dot(axis)));
+        x[OWN..].copy_from_slice(&self.axes.map(|axis| middle.dot(axis)));
     }
 
     /// Control points of the normal, and of their derivatives by the unknowns where `slopes` wants
@@ -126,11 +141,10 @@ impl NormalCurve {
             }
             slopes[LINE[e] + 2].normal[inner] = unit * grow;
         }
-        // In the frame of the start, so that turning the net turns the result and nothing else.
-        let axes = self.ends[0].frame;
-        points[2] = axes[0] * x[OWN] + axes[1] * x[OWN + 1] + axes[2] * x[OWN + 2];
+        let [along, up, across] = self.axes;
+        points[2] = along * x[OWN] + up * x[OWN + 1] + across * x[OWN + 2];
         if let Some(slopes) = slopes {
-            for (k, axis) in axes.into_iter().enumerate() {
+            for (k, axis) in self.axes.into_iter().enumerate() {
                 slopes[OWN + k].normal[2] = axis;
             }
         }
@@ -193,7 +207,7 @@ impl NormalCurve {
         jacobian: Option<&mut [f64]>,
     ) {
         let size = self.chord.length();
-        let length = 0.5 * (self.ends[0].length + self.ends[1].length);
+        let length = self.length();
         self.evaluate(x, out, jacobian, |p, _, put| {
             for d in p.velocity.windows(4) {
                 let third = d[3] - (d[2] - d[1]) * 3.0 - d[0];
@@ -220,14 +234,14 @@ impl NormalCurve {
         jacobian: Option<&mut [f64]>,
     ) {
         let size = self.chord.length();
-        let along = self.chord / size;
+        let (along, length) = (self.chord / size, self.length());
         self.evaluate(x, out, jacobian, |p, one, put| {
             let mean = p.velocity.iter().sum::<DVec3>() / CURVE_DEGREE as f64;
             let gap = (mean - self.chord * one) / size;
             if self.line {
                 put(gap.dot(along));
                 for n in &p.normal {
-                    put(n.dot(along) / self.ends[0].length);
+                    put(n.dot(along) / length);
                 }
             } else {
                 put_vector(gap, put);
@@ -272,8 +286,8 @@ pub(crate) struct Continuation<'a> {
 }
 
 impl Continuation<'_> {
-    /// The jump of the curvature at the vertex, times the chord of the first curve, and its
-    /// derivatives by the unknowns of both.
+    /// The jump of the curvature at the vertex, times the mean of the chords, and its derivatives
+    /// by the unknowns of both.
     pub(crate) fn jump(
         &self,
         x: [&[f64; COLUMNS]; 2],
@@ -281,7 +295,8 @@ impl Continuation<'_> {
     ) -> f64 {
         let [(first, e), (second, f)] = self.curves;
         let speed = [first.ends[e].speed, second.ends[f].speed];
-        let scale = first.chord.length() / (first.ends[e].length * speed[0]);
+        let chord = 0.5 * (first.chord.length() + second.chord.length());
+        let scale = chord / (first.ends[e].length * speed[0]);
         let (p, q) = (first.polygons(x[0]), second.polygons(x[1]));
         let [bend, across] = NormalCurve::bend(&p, e, speed[0]);
         let [other, _] = NormalCurve::bend(&q, f, speed[1]);
@@ -347,12 +362,8 @@ mod tests {
             speed: 1.3,
             relative_speed: 0.7,
         };
-        let curve = NormalCurve {
-            chord: DVec3::new(1.0, 0.2, 0.1),
-            ends: [end(DVec3::new(0.1, 0.0, 1.0), 0.9), end(DVec3::new(0.0, 0.6, 1.0), 1.2)],
-            sign: -1.0,
-            line,
-        };
+        let ends = [end(DVec3::new(0.1, 0.0, 1.0), 0.9), end(DVec3::new(0.0, 0.6, 1.0), 1.2)];
+        let curve = NormalCurve::new(DVec3::new(1.0, 0.2, 0.1), ends, -1.0, line);
         let mut x = [0.0; COLUMNS];
         for (k, x) in x.iter_mut().enumerate() {
             *x = 0.3 * (1.7 * k as f64 + 0.4).sin();
@@ -393,17 +404,17 @@ mod tests {
         let (curve, x) = sample(false);
         let [start, end] = curve.ends;
         // The same curve the other way: velocities are opposite, so speeds and family change sign.
-        let turned = NormalCurve { chord: -curve.chord, ends: [end, start], ..curve };
+        let opposite =
+            |e: CurveEnd| CurveEnd { speed: -e.speed, relative_speed: -e.relative_speed, ..e };
+        let turned =
+            NormalCurve::new(-curve.chord, [end, start].map(opposite), curve.sign, curve.line);
         let mut y = x;
         for k in 0..3 {
             (y[k], y[3 + k]) = (x[3 + k], x[k]);
             (y[6 + k], y[9 + k]) = (x[9 + k], x[6 + k]);
         }
         let middle = curve.polygons(&x).normal[2];
-        y[OWN..].copy_from_slice(&end.frame.map(|axis| middle.dot(axis)));
-        let opposite =
-            |e: CurveEnd| CurveEnd { speed: -e.speed, relative_speed: -e.relative_speed, ..e };
-        let turned = NormalCurve { ends: turned.ends.map(opposite), ..turned };
+        y[OWN..].copy_from_slice(&turned.axes.map(|axis| middle.dot(axis)));
         let both = Continuation { curves: [(&curve, 0), (&turned, 1)] };
         let mut slopes = [[0.0; COLUMNS]; 2];
         assert!(both.jump([&x, &y], Some(&mut slopes)).abs() < 1e-12);

@@ -9,7 +9,7 @@
 
 use std::collections::HashMap;
 
-use geom_core::DVec3;
+use geom_core::{DVec2, DVec3};
 use gp_solver::{
     Elements, MinNormProjection, Options, Problem, ProjectionOptions, ResidualBlock, solve,
 };
@@ -19,7 +19,7 @@ use crate::boundary::{Boundary, BoundaryOptions, arm_signs, bilinear_torsions};
 use crate::data::{AsymptoticNet, DATA_DEGREE};
 use crate::error::AsymptoticError;
 use crate::normal_curve::{
-    COLUMNS, CURVE_DEGREE, Continuation, CurveEnd, FAIR_ROWS, NormalCurve, OWN,
+    COLUMNS, CURVE_DEGREE, Continuation, CurveEnd, FAIR_ROWS, LINE, NormalCurve, OWN,
 };
 use crate::vertex::{PLANE_TOL, VertexFrame, curve_families, vertex_frames};
 
@@ -30,21 +30,24 @@ const FLAT: f64 = 1e-9;
 /// A net is refused if the faces at more than this share of its vertices twist the wrong way or not
 /// at all: between random twists half of them do.
 const MOST_WITHOUT_TWIST: f64 = 0.25;
-/// Weights of gaps and jumps, in chords, one after the other: a large one from the start would make
-/// the way long.
-const CLOSING: [f64; 3] = [10.0, 100.0, 1000.0];
+/// Weights of gaps and jumps, in chords, one solve after the other. Multipliers do most of the
+/// closing: with weights alone, large ones, the solver crawls along the bottom of a bent valley.
+const CLOSING: [f64; 4] = [10.0, 10.0, 30.0, 100.0];
 /// Weight of the tilt of a normal, in radians.
 const NORMAL_PULL: f64 = 0.1;
 /// Weight of the change of a tangent, relative to its length.
 const TANGENT_PULL: f64 = 0.1;
-/// Weight of the logarithm of the length of a normal, and of its growth: enough to decide what
-/// nothing else does.
+/// Weight of the logarithm of the length of a normal, and of its relative growth along a mean
+/// chord: enough to decide what nothing else does.
 const LENGTH_PULL: f64 = 1e-3;
+const GROWTH_PULL: f64 = 1e-2;
+/// How far a growth goes in shortest steps, where a tangent goes one.
+const GROWTH_STEP: f64 = 0.1;
 /// Arms with an angle of a cosine below this are one line.
 const GOES_ON: f64 = -0.9;
-/// Steps of Levenberg-Marquardt, and the relative decrease that ends them: less is invisible.
-const STEPS: usize = 12;
-const DECREASE: f64 = 1e-4;
+/// Steps of Levenberg-Marquardt for each weight, and the relative decrease that ends them.
+const STEPS: usize = 50;
+const DECREASE: f64 = 1e-6;
 /// Gaps that count as closed, in chords.
 const CLOSED: f64 = 1e-11;
 
@@ -192,7 +195,7 @@ impl<'a> NormalNet<'a> {
                 columns[k] = out.x.len() + k - OWN;
             }
             let sign = (signs[i][0] * torsions[curve.ends[0]]).signum();
-            let data = NormalCurve { chord: net.chord(curve), ends, sign, line: curve.line };
+            let data = NormalCurve::new(net.chord(curve), ends, sign, curve.line);
             let mut own = columns.map(|c| out.x.get(c).copied().unwrap_or(0.0));
             data.start(&mut own);
             out.x.extend(&own[OWN..]);
@@ -202,13 +205,32 @@ impl<'a> NormalNet<'a> {
         out
     }
 
-    /// Normal, direction of the first arm, and the direction across it.
+    /// The normal, and two directions that halve the angles between the lines through the vertex.
+    /// They depend on nothing but the lines, neither on axes nor on the order of anything (but
+    /// where three or more lines of a family meet, on which of them comes first).
     fn frame_at(&self, v: usize) -> [DVec3; 3] {
         let Some(frame) = &self.frames[v] else { return [DVec3::Z, DVec3::X, DVec3::Y] };
-        let (curve, end) = frame.arms[0];
-        let (up, arm) = (frame.normal, self.net.curves[curve].arms[end]);
-        let right = (arm - up * arm.dot(up)).normalize();
-        [up, right, up.cross(right)]
+        let up = frame.normal;
+        let direction = |&(curve, end): &(usize, usize)| {
+            let arm = self.net.curves[curve].arms[end];
+            (arm - up * arm.dot(up)).normalize()
+        };
+        let right = direction(&frame.arms[0]);
+        let left = up.cross(right);
+        // Twice the angles, so that both ways along a line are the same; one family less the
+        // other, which is never nothing where two lines cross.
+        let mut doubled = DVec2::ZERO;
+        for (arm, sign) in frame.arms.iter().zip(&frame.signs) {
+            let arm = direction(arm);
+            let arm = DVec2::new(arm.dot(right), arm.dot(left));
+            doubled += arm.rotate(arm) * *sign;
+        }
+        if doubled.length() < 0.1 {
+            return [up, right, left];
+        }
+        let turn = DVec2::from_angle(0.5 * doubled.to_angle());
+        let halving = right * turn.x + left * turn.y;
+        [up, halving, up.cross(halving)]
     }
 
     /// Numbers the tangents: where two arms of a vertex are one line, they share one.
@@ -251,8 +273,8 @@ impl<'a> NormalNet<'a> {
         let start = self.x.clone();
         let mut scale = vec![1.0; start.len()];
         for (curve, columns) in self.curves.iter().zip(&self.columns) {
-            let size = 0.5 * (curve.ends[0].length + curve.ends[1].length);
-            columns[OWN..].iter().for_each(|c| scale[*c] = size);
+            columns[OWN..].iter().for_each(|c| scale[*c] = curve.length());
+            LINE.iter().for_each(|tangent| scale[columns[tangent + 2]] = GROWTH_STEP);
         }
         let mut fixed = Vec::new();
         for (v, frame) in self.frames.iter().enumerate() {
@@ -271,7 +293,7 @@ impl<'a> NormalNet<'a> {
         let options = Options { max_iterations: STEPS, energy_tol: DECREASE, ..Options::default() };
         let mut x = start.clone();
         for weight in CLOSING {
-            exact.weight = weight;
+            exact.reweight(weight, &x);
             let mut problem = Problem::new(start.len());
             fixed.iter().for_each(|c| {
                 problem.fix(*c);
@@ -281,7 +303,7 @@ impl<'a> NormalNet<'a> {
             problem.add(&mut fair).add(&mut exact).add(&mut pull);
             solve(problem, &mut x, &options).map_err(AsymptoticError::Curves)?;
         }
-        exact.weight = 1.0;
+        exact.release();
         let mut projection =
             MinNormProjection::new(&exact, x.len(), 3).map_err(AsymptoticError::Curves)?;
         let options =
@@ -391,6 +413,8 @@ struct Exactness<'a> {
     second: Vec<[usize; COLUMNS]>,
     elements: Elements,
     weight: f64,
+    /// Added to every row: the multiplier over the square of the weight.
+    shift: Vec<f64>,
 }
 
 impl<'a> Exactness<'a> {
@@ -414,7 +438,26 @@ impl<'a> Exactness<'a> {
             }));
             elements.push(&all, 1);
         }
-        Self { curves, columns, continued, second, elements, weight: 1.0 }
+        let shift = vec![0.0; elements.rows_total()];
+        Self { curves, columns, continued, second, elements, weight: 1.0, shift }
+    }
+
+    /// The method of multipliers: what the last weight left at `x` sets the multipliers, so
+    /// that the next solve leaves far less of it.
+    fn reweight(&mut self, weight: f64, x: &[f64]) {
+        if self.weight != 1.0 {
+            let mut rows = vec![0.0; self.shift.len()];
+            self.residuals(x, &mut rows);
+            let share = self.weight / (weight * weight);
+            self.shift = rows.iter().map(|r| share * r).collect();
+        }
+        self.weight = weight;
+    }
+
+    /// The bare equations.
+    fn release(&mut self) {
+        self.weight = 1.0;
+        self.shift.fill(0.0);
     }
 
     fn fill(&self, x: &[f64], residuals: &mut [f64], mut jacobian: Option<&mut [f64]>) {
@@ -440,6 +483,7 @@ impl<'a> Exactness<'a> {
                 }
             }
         }
+        residuals.iter_mut().zip(&self.shift).for_each(|(r, shift)| *r += shift);
         residuals.iter_mut().chain(jacobian.into_iter().flatten()).for_each(|r| *r *= self.weight);
     }
 }
@@ -477,7 +521,8 @@ impl Pull {
         for c in 0..end {
             elements.push(&[c], 1);
             weights.push(match (c >= tangents, c % 3) {
-                (true, 2) | (false, 0) => LENGTH_PULL,
+                (true, 2) => GROWTH_PULL,
+                (false, 0) => LENGTH_PULL,
                 (true, _) => TANGENT_PULL,
                 (false, _) => NORMAL_PULL,
             });

@@ -8,7 +8,7 @@ use asymptotic_bezier::{
     solve_boundary, solve_quadrilateral,
 };
 use common::{catenoid, enneper, exact_net, reference_set, sampled_net};
-use geom_core::{DVec3, PolyMesh};
+use geom_core::{DMat3, DVec3, PolyMesh};
 
 #[test]
 fn good_sets_have_asymptotic_boundaries_and_no_warnings() {
@@ -162,26 +162,54 @@ fn nets_across_inflections_join_without_kinks() {
     assert_eq!(auto, shell);
 }
 
+/// Moved, scaled, numbered backwards, faces turned over and listed from another corner: the same
+/// curves, some the other way round and the families swapped.
 #[test]
-fn curves_from_normals_turn_and_grow_with_their_net() {
-    let mesh = sampled_net(catenoid, [-0.7, 0.8, -0.4, 0.5], [4, 4]);
+fn curves_from_normals_depend_on_nothing_but_the_shape() {
+    check_invariance(&sampled_net(catenoid, [-0.7, 0.8, -0.4, 0.5], [4, 4]));
+    // Across the inflections of Enneper's surface.
+    check_invariance(&sampled_net(enneper, [-0.5, 0.6, -0.7, 0.5], [4, 5]));
+}
+
+fn check_invariance(mesh: &PolyMesh) {
     let options = BoundaryOptions { form: CurveForm::Normals, ..Default::default() };
-    let curves = |map: &dyn Fn(DVec3) -> DVec3| {
-        let moved: Vec<DVec3> = mesh.positions().iter().map(|p| map(*p)).collect();
-        let faces: Vec<Vec<u32>> = mesh
-            .faces()
-            .map(|f| mesh.face_vertices(f).map(|v| v.index() as u32).collect())
-            .collect();
-        let moved = PolyMesh::new(moved, &faces).unwrap();
-        let net = AsymptoticNet::from_mesh(&moved).unwrap();
-        solve_boundary(&net, &options).unwrap().curves
-    };
-    let turn = geom_core::DMat3::from_axis_angle(DVec3::new(1.0, 2.0, -0.5).normalize(), 0.7);
+    let turn = DMat3::from_axis_angle(DVec3::new(1.0, 2.0, -0.5).normalize(), 0.7);
     let map = |p: DVec3| turn * p * 37.0 + DVec3::new(5.0, -3.0, 8.0);
-    for (before, after) in curves(&|p| p).iter().zip(&curves(&map)) {
-        for (p, q) in before.points().iter().zip(after.points()) {
-            assert!(map(*p).distance(*q) < 37.0 * 1e-10, "{}", map(*p).distance(*q));
+    let faces: Vec<Vec<u32>> =
+        mesh.faces().map(|f| mesh.face_vertices(f).map(|v| v.index() as u32).collect()).collect();
+    let last = mesh.positions().len() as u32 - 1;
+    let curves = |positions: Vec<DVec3>, faces: &[Vec<u32>]| {
+        let moved = PolyMesh::new(positions, faces).unwrap();
+        let net = AsymptoticNet::from_mesh(&moved).unwrap();
+        let curves = solve_boundary(&net, &options).unwrap().curves;
+        let ends = net.curves().iter().map(|c| c.ends);
+        ends.zip(curves.iter().map(|c| c.points().to_vec())).collect::<Vec<_>>()
+    };
+    let before = curves(mesh.positions().to_vec(), &faces);
+    let after = curves(mesh.positions().iter().map(|p| map(*p)).collect(), &faces);
+    for ((ends, p), (others, q)) in before.iter().zip(&after) {
+        assert_eq!(ends, others);
+        let far = p.iter().zip(q).map(|(p, q)| map(*p).distance(*q)).fold(0.0, f64::max);
+        assert!(far < 37.0 * 1e-10, "moved: {far}");
+    }
+    let backwards: Vec<Vec<u32>> = faces
+        .iter()
+        .rev()
+        .map(|f| [3, 2, 1, 0].iter().map(|k| last - f[(*k + 1) % 4]).collect())
+        .collect();
+    let after = curves(mesh.positions().iter().rev().copied().collect(), &backwards);
+    for (ends, p) in &before {
+        let there = ends.map(|v| last as usize - v);
+        let (others, q) = after
+            .iter()
+            .find(|(others, _)| *others == there || *others == [there[1], there[0]])
+            .expect("every curve is in both nets");
+        let mut q = q.clone();
+        if *others != there {
+            q.reverse();
         }
+        let far = p.iter().zip(q).map(|(p, q)| p.distance(q)).fold(0.0, f64::max);
+        assert!(far < 1e-10, "renumbered: {far}");
     }
 }
 

@@ -50,11 +50,13 @@ struct Options {
     /// How the inner control points are found: with the tangent fields, or by a mask
     #[arg(long, value_enum)]
     interior: Option<InteriorName>,
-    /// Degree of the boundary curves, 5 to 9; 4 for exact data of one patch, curvatures unused
+    /// Degree of boundary curves made from curvatures, 5 to 9; 4 for exact data of one patch,
+    /// curvatures unused
     #[arg(long, value_name = "N")]
     boundary_degree: Option<usize>,
-    /// What the boundary curves are made from: tangents and curvatures as given, or normals, which
-    /// inflections do not disturb (default: normals if a net made from positions needs them)
+    /// What the boundary curves are made from: tangents and curvatures as given, or normals (of
+    /// degree 7), which inflections do not disturb (default: normals if a net made from positions
+    /// needs them)
     #[arg(long, value_enum)]
     curves: Option<CurvesName>,
     /// What the freedom of boundary curves made from curvatures minimises
@@ -113,6 +115,15 @@ crate::layered!(Options {
     youngs_modulus,
     shear_modulus,
 });
+
+impl Options {
+    /// The given flags that curves made from normals have no use for.
+    fn for_curvatures(&self) -> Vec<&'static str> {
+        let degree = self.boundary_degree.map(|_| "--boundary-degree");
+        let energy = self.boundary_energy.map(|_| "--boundary-energy");
+        degree.into_iter().chain(energy).collect()
+    }
+}
 
 #[derive(Clone, Copy, Debug, clap::ValueEnum, Deserialize)]
 #[serde(rename_all = "snake_case")]
@@ -196,7 +207,7 @@ impl Asymptotic {
         if let Some(folder) = &options.lamellas {
             check_output_path(&folder.join("lamellas.svg"))?;
         }
-        check_sizes(&options)?;
+        check_options(&options)?;
         let (input, handles, unit) = read_input(&self.data, &options)?;
         let settings = design_options(&options, handles);
         let result = design(&input, &settings).map_err(|e| Failure::input(&self.data, e))?;
@@ -217,6 +228,11 @@ impl Asymptotic {
         }
         outcome.summary = summary(&result, &unit);
         outcome.warnings = result.check.warnings.iter().map(ToString::to_string).collect();
+        if result.shell.boundary.is_from_normals() {
+            outcome.warnings.extend(options.for_curvatures().into_iter().map(|flag| {
+                format!("{flag} was not used: this net needs curves made from normals")
+            }));
+        }
         if self.report.wanted() {
             page::add(&mut outcome, &self.report, context, &result, unit)?;
         }
@@ -342,7 +358,7 @@ fn model_for(path: &Path, result: &Design, unit: &LengthUnit) -> Result<Model, F
 }
 
 /// Refuses sizes and moduli that no strip can have.
-fn check_sizes(options: &Options) -> Result<(), Failure> {
+fn check_options(options: &Options) -> Result<(), Failure> {
     let sizes = [
         ("--lamella-width", options.lamella_width),
         ("--lamella-thickness", options.lamella_thickness),
@@ -355,6 +371,13 @@ fn check_sizes(options: &Options) -> Result<(), Failure> {
         {
             return Err(Failure::usage(format!("{name} is {value}; give a positive number")));
         }
+    }
+    if let (Some(CurvesName::Normals), Some(flag)) =
+        (options.curves, options.for_curvatures().first())
+    {
+        let text =
+            format!("{flag} is for curves made from curvatures; drop it or --curves normals");
+        return Err(Failure::usage(text));
     }
     Ok(())
 }
