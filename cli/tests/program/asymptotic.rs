@@ -41,11 +41,14 @@ fn net_files_of_hnet_are_filled_across_their_inflections() {
 
 #[test]
 fn meshes_along_other_lines_are_refused() {
-    // Curvature lines of a torus, and a mesh that is only roughly asymptotic.
+    // Curvature lines of a torus, and meshes that are only roughly asymptotic.
     let torus = ["asymptotic", "fixtures/quads/torus.obj", "--from-net"];
     refused(&torus, "a.step", &["do not twist", "use a mesh along asymptotic lines"]);
     let rough = ["asymptotic", "fixtures/nets/enneper.obj", "--from-net"];
     refused(&rough, "a.step", &["net curve", "umbilic hnet"]);
+    // Where curves are found nonetheless, their roughness is warned about.
+    let warned = metrics(&["fixtures/nets/scherk.obj", "--from-net"]);
+    assert_eq!(warned["warnings"], 1);
 }
 
 #[test]

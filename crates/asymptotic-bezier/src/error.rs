@@ -224,6 +224,11 @@ pub enum AsymptoticWarning {
         "{place}: interior vertex of odd valence {valence}; torsion and Gaussian curvature are zero there"
     )]
     OddValence { place: Place, valence: usize },
+    /// Curves from normals that leave the edges of their mesh far behind.
+    #[error(
+        "{place}: a curve had to turn by {degrees:.0} degrees from what the edges let expect (more than 20), so the surface is rough; make the net exactly asymptotic first (umbilic hnet does), or refine it"
+    )]
+    RoughNet { place: Place, degrees: f64 },
     /// The torsion equation at a corner carries no unknown and is satisfied anyway.
     #[error("{place}: the torsion equation is vacuous, one extra freedom is left to the energy")]
     VacuousTorsion { place: Place },

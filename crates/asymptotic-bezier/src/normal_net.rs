@@ -11,13 +11,14 @@ use std::collections::HashMap;
 
 use geom_core::{DVec2, DVec3};
 use gp_solver::{
-    Elements, MinNormProjection, Options, Problem, ProjectionOptions, ResidualBlock, solve,
+    Elements, MinNormProjection, Options, Problem, ProjectionOptions, ResidualBlock, Status, solve,
 };
 use rayon::prelude::*;
 
 use crate::boundary::{Boundary, BoundaryOptions, arm_signs, bilinear_torsions};
+use crate::curve::BezierCurve;
 use crate::data::{AsymptoticNet, DATA_DEGREE};
-use crate::error::AsymptoticError;
+use crate::error::{AsymptoticError, AsymptoticWarning};
 use crate::normal_curve::{
     COLUMNS, CURVE_DEGREE, Continuation, CurveEnd, FAIR_ROWS, LINE, NormalCurve, OWN,
 };
@@ -30,6 +31,10 @@ const FLAT: f64 = 1e-9;
 /// A net is refused if the faces at more than this share of its vertices twist the wrong way or not
 /// at all: between random twists half of them do.
 const MOST_WITHOUT_TWIST: f64 = 0.25;
+/// Tangents that turn by more degrees from the estimates are warned about: on exact nets of coarse
+/// meshes they turn by up to twelve, on meshes that are only roughly asymptotic by more than thirty,
+/// with mean curvatures that jump accordingly.
+const MOST_TURN: f64 = 20.0;
 /// Weights of gaps and jumps, in chords, one solve after the other. Multipliers do most of the
 /// closing: with weights alone, large ones, the solver crawls along the bottom of a bent valley.
 const CLOSING: [f64; 4] = [10.0, 10.0, 30.0, 100.0];
@@ -46,7 +51,7 @@ const GROWTH_STEP: f64 = 0.1;
 /// Arms with an angle of a cosine below this are one line.
 const GOES_ON: f64 = -0.9;
 /// Steps of Levenberg-Marquardt for each weight, and the relative decrease that ends them.
-const STEPS: usize = 50;
+const STEPS: usize = 30;
 const DECREASE: f64 = 1e-6;
 /// Gaps that count as closed, in chords.
 const CLOSED: f64 = 1e-11;
@@ -115,17 +120,32 @@ pub(crate) fn solve_by_normals(
         }
         let curves = problem.curves()?;
         let normals = problem.normals();
+        let warnings = rough_tangents(&net, &curves).into_iter().collect();
         return Ok(Boundary {
             strain_energy: curves.iter().map(|c| c.derivative_energy(2)).sum(),
             freedoms: problem.freedoms(&held),
             inflections: vec![Vec::new(); curves.len()],
             curves,
             torsions: found,
-            warnings: Vec::new(),
+            warnings,
             signs,
             normals,
         });
     }
+}
+
+/// The tangent that turned most from what the positions let expect, if that is too much.
+fn rough_tangents(net: &AsymptoticNet, curves: &[BezierCurve]) -> Option<AsymptoticWarning> {
+    let turn = |(i, e): (usize, usize)| {
+        let forward = [1.0, -1.0][e];
+        let tangent = curves[i].jet(e as f64).first * forward;
+        tangent.angle_between(net.curves[i].arms[e]).to_degrees()
+    };
+    let ends = (0..curves.len()).flat_map(|i| [(i, 0), (i, 1)]);
+    let (degrees, (curve, end)) =
+        ends.map(|at| (turn(at), at)).max_by(|a, b| a.0.total_cmp(&b.0))?;
+    let place = net.vertex_place(net.curves[curve].ends[end]);
+    (degrees > MOST_TURN).then_some(AsymptoticWarning::RoughNet { place, degrees })
 }
 
 /// The common sign of the torsions and their values with it, away from zero.
@@ -301,7 +321,11 @@ impl<'a> NormalNet<'a> {
             // Normals, lines and curves have three unknowns each.
             problem.set_runs(3);
             problem.add(&mut fair).add(&mut exact).add(&mut pull);
-            solve(problem, &mut x, &options).map_err(AsymptoticError::Curves)?;
+            let report = solve(problem, &mut x, &options).map_err(AsymptoticError::Curves)?;
+            if report.status == Status::IterationLimit {
+                // No curves are near; more weights would take long to say so.
+                break;
+            }
         }
         exact.release();
         let mut projection =
@@ -318,7 +342,7 @@ impl<'a> NormalNet<'a> {
     }
 
     /// The solved curves.
-    fn curves(&self) -> Result<Vec<crate::curve::BezierCurve>, AsymptoticError> {
+    fn curves(&self) -> Result<Vec<BezierCurve>, AsymptoticError> {
         (0..self.curves.len())
             .map(|i| {
                 let (data, x) = (&self.curves[i], self.unknowns(i));

@@ -179,9 +179,9 @@ fn check_invariance(mesh: &PolyMesh) {
         mesh.faces().map(|f| mesh.face_vertices(f).map(|v| v.index() as u32).collect()).collect();
     let last = mesh.positions().len() as u32 - 1;
     let curves = |positions: Vec<DVec3>, faces: &[Vec<u32>]| {
-        let moved = PolyMesh::new(positions, faces).unwrap();
-        let net = AsymptoticNet::from_mesh(&moved).unwrap();
-        let curves = solve_boundary(&net, &options).unwrap().curves;
+        let moved = PolyMesh::new(positions, faces).expect("the mesh moved");
+        let net = AsymptoticNet::from_mesh(&moved).expect("quads");
+        let curves = solve_boundary(&net, &options).expect("curves").curves;
         let ends = net.curves().iter().map(|c| c.ends);
         ends.zip(curves.iter().map(|c| c.points().to_vec())).collect::<Vec<_>>()
     };
