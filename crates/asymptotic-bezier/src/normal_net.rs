@@ -341,20 +341,23 @@ impl<'a> NormalNet<'a> {
         self.columns[i].map(|c| self.x[c])
     }
 
-    /// The solved curves.
+    /// The solved curves, if all reach their ends.
     fn curves(&self) -> Result<Vec<BezierCurve>, AsymptoticError> {
-        (0..self.curves.len())
-            .map(|i| {
-                let (data, x) = (&self.curves[i], self.unknowns(i));
-                let mut exact = [0.0; 6];
-                data.exactness(&x, &mut exact, None);
-                let gap = exact.iter().fold(0.0_f64, |a, b| a.max(b.abs()));
-                if !(gap <= CLOSED) {
-                    return Err(AsymptoticError::NotClosed { place: self.net.curve_place(i), gap });
-                }
-                Ok(data.curve(&x, self.net.curves[i].ends.map(|v| self.net.positions[v])))
-            })
-            .collect()
+        let gap = |i: usize| {
+            let mut exact = [0.0; 6];
+            self.curves[i].exactness(&self.unknowns(i), &mut exact, None);
+            exact.iter().fold(0.0_f64, |a, b| a.max(b.abs()))
+        };
+        let gaps = (0..self.curves.len()).map(|i| (gap(i), i));
+        if let Some((gap, i)) = gaps.max_by(|a, b| a.0.total_cmp(&b.0))
+            && !(gap <= CLOSED)
+        {
+            return Err(AsymptoticError::NotClosed { place: self.net.curve_place(i), gap });
+        }
+        let ends = |i: usize| self.net.curves[i].ends.map(|v| self.net.positions[v]);
+        Ok((0..self.curves.len())
+            .map(|i| self.curves[i].curve(&self.unknowns(i), ends(i)))
+            .collect())
     }
 
     /// Torsion per vertex with the sign of the first family.

@@ -5,12 +5,12 @@
 mod common;
 
 use asymptotic_bezier::{
-    AsymptoticError, AsymptoticWarning, BoundaryOptions, CornerData, Curvatures, PatchCheck,
-    PatchOptions, Place, TorsionHandle, doubt_signs, fill_patch, solve_quadrilateral,
-    solve_quartic_quadrilateral,
+    AsymptoticNet, AsymptoticWarning, BoundaryOptions, CornerData, Curvatures, CurveForm,
+    DesignOptions, Input, Joins, PatchCheck, PatchOptions, Place, TorsionHandle, design,
+    doubt_signs, fill_patch, solve_boundary, solve_quadrilateral, solve_quartic_quadrilateral,
 };
-use common::reference_set;
-use geom_core::DVec3;
+use common::{Gauss, catenoid, enneper, exact_net, reference_set, sampled_net};
+use geom_core::{DVec3, PolyMesh};
 
 fn said(warnings: &[AsymptoticWarning], words: &str) -> bool {
     warnings.iter().any(|w| w.to_string().contains(words))
@@ -111,11 +111,46 @@ fn quartics_need_exact_data() {
     assert!(error.starts_with("curve 1: the corner planes at both ends are parallel"), "{error}");
 }
 
-/// Data that no run of ours has reached, but whose sentences a user may meet.
+/// Curvatures that no one surface has, twice too large at one end of each curve and half at the
+/// other: patches that join C1 have no freedom left to unfold.
 #[test]
-fn rare_messages_name_the_place_and_the_remedy() {
-    let fold = AsymptoticWarning::JointFold { place: Place::Patch(3), shared: 2 }.to_string();
-    assert!(fold.starts_with("patch 3: ") && fold.contains("G1"), "{fold}");
-    let gap = AsymptoticError::NotClosed { place: Place::NetCurve(7), gap: 2e-3 }.to_string();
-    assert!(gap.starts_with("net curve 7: ") && gap.contains("umbilic hnet"), "{gap}");
+fn joint_patches_that_fold_are_told() {
+    let net = exact_net(catenoid, [0.1, 0.9, 0.1, 0.9], [2, 2]);
+    let mut curves = net.curves().to_vec();
+    for (i, curve) in curves.iter_mut().enumerate() {
+        for (e, k) in curve.curvatures.iter_mut().enumerate() {
+            *k *= [2.0, 0.5][(i + e) % 2];
+        }
+    }
+    let quads = [0, 1, 3, 4].map(|k| [k, k + 3, k + 4, k + 1]);
+    let net = AsymptoticNet::new(net.positions().to_vec(), &quads, curves).unwrap();
+    let options = DesignOptions { joins: Joins::C1, ..Default::default() };
+    let folded = design(&Input::Net(net), &options).unwrap();
+    let words = "patch 1: with 2 of its joins C1 the patch folds; use G1 joins or a higher degree";
+    assert!(said(&folded.check.warnings, words), "{:?}", folded.check.warnings);
+}
+
+/// Noise on the vertices of an asymptotic mesh: curves from normals are found, rough ones, or not.
+#[test]
+fn nets_that_are_only_roughly_asymptotic_are_told() {
+    let mesh = sampled_net(enneper, [-0.5, 0.6, -0.7, 0.5], [5, 5]);
+    let curves = |noise: f64| {
+        let mut gauss = Gauss::new(7);
+        let moved = |p: &DVec3| *p + noise * DVec3::new(gauss.next(), gauss.next(), gauss.next());
+        let positions = mesh.positions().iter().map(moved).collect();
+        let faces: Vec<Vec<u32>> = mesh
+            .faces()
+            .map(|f| mesh.face_vertices(f).map(|v| v.index() as u32).collect())
+            .collect();
+        let net = AsymptoticNet::from_mesh(&PolyMesh::new(positions, &faces).unwrap()).unwrap();
+        let options = BoundaryOptions { form: CurveForm::Normals, ..Default::default() };
+        solve_boundary(&net, &options)
+    };
+    assert!(curves(0.0).unwrap().warnings.is_empty());
+    let rough = curves(0.003).unwrap().warnings;
+    let words = "vertex 0: a curve had to turn by 24 degrees from what the edges let expect";
+    assert!(said(&rough, words), "{rough:?}");
+    let error = curves(0.01).unwrap_err().to_string();
+    assert!(error.contains(": no curve from normals reaches its end (gap "), "{error}");
+    assert!(error.ends_with("(umbilic hnet does), or refine it"), "{error}");
 }
