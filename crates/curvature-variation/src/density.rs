@@ -51,6 +51,16 @@ impl Density {
         [mean, square, product, twist, f1, f3, coupling, root, barrier].iter().all(|&c| c == 0.0)
     }
 
+    /// Whether a term depends on the second fundamental form alone.
+    #[inline(always)]
+    fn has_second_order(&self) -> bool {
+        self.square != 0.0
+            || self.product != 0.0
+            || self.twist != 0.0
+            || self.mean != 0.0
+            || self.absolute != 0.0
+    }
+
     /// `self + factor · other`.
     pub(crate) fn plus(&self, factor: f64, other: &Self) -> Self {
         Self {
@@ -75,22 +85,20 @@ pub(crate) type Derivatives<S> = [Vec3<S>; 9];
 
 /// Everything the densities and their adjoints share.
 pub(crate) struct Shape<S: Simd> {
-    e: Lanes<S>,
-    f: Lanes<S>,
     pub(crate) area: Lanes<S>,
     pub(crate) inv_area: Lanes<S>,
     al: Lanes<S>,
     be: Lanes<S>,
     ga: Lanes<S>,
+    /// `al², al be, al ga, be², 2 be ga, ga²`.
+    products: [Lanes<S>; 6],
     pub(crate) n: Vec3<S>,
     e1: Vec3<S>,
     e2: Vec3<S>,
-    h: [Lanes<S>; 4],
-    p: [Lanes<S>; 3],
-    x: [Lanes<S>; 3],
-    y: [Lanes<S>; 3],
-    xf: [Lanes<S>; 3],
-    yf: [Lanes<S>; 3],
+    /// `D³S · n` in the frame.
+    third: [Lanes<S>; 4],
+    /// `D²S · e1` and `D²S · e2` in the frame.
+    tangential: [[Lanes<S>; 3]; 2],
     /// Second fundamental form in the frame.
     pub(crate) second: [Lanes<S>; 3],
     /// `F1c, F1s, F3c, F3s`.
@@ -105,47 +113,25 @@ pub(crate) struct FrameAdjoint<S: Simd> {
     pub(crate) area: Lanes<S>,
 }
 
-impl<S: Simd> FrameAdjoint<S> {
-    /// All adjoints times one factor.
-    #[inline(always)]
-    pub(crate) fn scaled(&self, factor: Lanes<S>) -> Self {
-        let ([a, b, c, d], [l, m, q]) = (self.harmonics, self.second);
-        Self {
-            harmonics: [a * factor, b * factor, c * factor, d * factor],
-            second: [l * factor, m * factor, q * factor],
-            area: self.area * factor,
-        }
-    }
+/// Quadratic form on `(u, v)` in the frame `e1 = al S_u`, `e2 = be S_u + ga S_v`, from the products
+/// of `al`, `be` and `ga`.
+#[inline(always)]
+fn to_frame<S: Simd>(products: &[Lanes<S>; 6], r: &[Lanes<S>; 3]) -> [Lanes<S>; 3] {
+    let [aa, ab, ag, bb, bg, gg] = *products;
+    [aa * r[0], ab.fma(r[0], ag * r[1]), bb.fma(r[0], bg.fma(r[1], gg * r[2]))]
 }
 
-/// Quadratic form on `(u, v)` in the frame `e1 = al S_u`, `e2 = be S_u + ga S_v`.
+/// Adjoint of [`to_frame`].
 #[inline(always)]
-fn to_frame<S: Simd>(al: Lanes<S>, be: Lanes<S>, ga: Lanes<S>, r: &[Lanes<S>; 3]) -> [Lanes<S>; 3] {
-    let first = be.fma(r[0], ga * r[1]);
-    let second = be.fma(r[1], ga * r[2]);
-    [al * al * r[0], al * first, be.fma(first, ga * second)]
+fn from_frame<S: Simd>(products: &[Lanes<S>; 6], o: &[Lanes<S>; 3]) -> [Lanes<S>; 3] {
+    let [aa, ab, ag, bb, bg, gg] = *products;
+    [aa.fma(o[0], ab.fma(o[1], bb * o[2])), ag.fma(o[1], bg * o[2]), gg * o[2]]
 }
 
-/// Adjoint of [`to_frame`]: adjoints of `r`, and what is added to those of `al`, `be`, `ga`.
+/// `Σ a_k b_k`.
 #[inline(always)]
-fn to_frame_adjoint<S: Simd>(
-    [al, be, ga]: [Lanes<S>; 3],
-    r: &[Lanes<S>; 3],
-    o: &[Lanes<S>; 3],
-    sums: &mut [Lanes<S>; 3],
-) -> [Lanes<S>; 3] {
-    let first = be.fma(r[0], ga * r[1]);
-    let second = be.fma(r[1], ga * r[2]);
-    let twice = o[2] * 2.0;
-    let (a0, a1) = (al * r[0], al * r[1]);
-    sums[0] = sums[0] + (a0 * o[0]) * 2.0 + first * o[1];
-    sums[1] = sums[1] + a0.fma(o[1], twice * first);
-    sums[2] = sums[2] + a1.fma(o[1], twice * second);
-    [
-        (al * al).fma(o[0], (al * be).fma(o[1], be * be * o[2])),
-        ga * al.fma(o[1], be * twice),
-        ga * ga * o[2],
-    ]
+fn pair<S: Simd>(a: &[Lanes<S>; 3], b: &[Lanes<S>; 3], sum: Lanes<S>) -> Lanes<S> {
+    a[0].fma(b[0], a[1].fma(b[1], a[2].fma(b[2], sum)))
 }
 
 // Closures and the adaptors of arrays are compiled without the caller's instruction set and then
@@ -155,12 +141,13 @@ impl<S: Simd> Shape<S> {
     pub(crate) fn new(d: &Derivatives<S>) -> Self {
         let normal = cross(&d[0], &d[1]);
         let area = dot(&normal, &normal).sqrt();
-        let inv_area = area.recip();
         let (e, f) = (dot(&d[0], &d[0]), dot(&d[0], &d[1]));
         let length = e.sqrt();
+        let inv_area = area.recip();
         let al = length.recip();
         let ga = length * inv_area;
         let be = -(f * al * inv_area);
+        let products = [al * al, al * be, al * ga, be * be, be * ga * 2.0, ga * ga];
         let n = scaled(&normal, inv_area);
         let e1 = scaled(&d[0], al);
         let e2 = axpy(&d[0], be, &scaled(&d[1], ga));
@@ -168,184 +155,202 @@ impl<S: Simd> Shape<S> {
         let p = [dot(&d[2], &n), dot(&d[3], &n), dot(&d[4], &n)];
         let x = [dot(&d[2], &e1), dot(&d[3], &e1), dot(&d[4], &e1)];
         let y = [dot(&d[2], &e2), dot(&d[3], &e2), dot(&d[4], &e2)];
-        let second = to_frame(al, be, ga, &p);
-        let xf = to_frame(al, be, ga, &x);
-        let yf = to_frame(al, be, ga, &y);
+        let second = to_frame(&products, &p);
+        let xf = to_frame(&products, &x);
+        let yf = to_frame(&products, &y);
         let [l, m, q] = second;
+        let [aa, ab, ag, bb, bg, gg] = products;
+        let along_u = bb.fma(h[0], bg.fma(h[1], gg * h[2]));
+        let along_v = bb.fma(h[1], bg.fma(h[2], gg * h[3]));
+        let third = [
+            al * aa * h[0],
+            al * ab.fma(h[0], ag * h[1]),
+            al * along_u,
+            be.fma(along_u, ga * along_v),
+        ];
         // C = D³S·n − the symmetrised II(tangential D²S, ·).
-        let b1 = be.fma(h[0], ga * h[1]);
-        let b2 = be.fma(h[1], ga * h[2]);
-        let b3 = be.fma(h[2], ga * h[3]);
-        let c1 = be.fma(b1, ga * b2);
-        let c2 = be.fma(b2, ga * b3);
-        let d1 = be.fma(c1, ga * c2);
-        let a = al * al * al * h[0] - (xf[0].fma(l, yf[0] * m)) * 3.0;
-        let b = al * al * b1 - (xf[1].fma(l, yf[1] * m)) * 2.0 - xf[0].fma(m, yf[0] * q);
-        let c = al * c1 - (xf[1].fma(m, yf[1] * q)) * 2.0 - xf[2].fma(l, yf[2] * m);
-        let d0 = d1 - (xf[2].fma(m, yf[2] * q)) * 3.0;
-        let harmonics =
-            [(a + c) * 0.75, (b + d0) * 0.75, (a - c * 3.0) * 0.25, (b * 3.0 - d0) * 0.25];
-        Self { e, f, area, inv_area, al, be, ga, n, e1, e2, h, p, x, y, xf, yf, second, harmonics }
+        let a = xf[0].fma(l, yf[0] * m).fnma(3.0, third[0]);
+        let b = xf[0].fma(m, yf[0] * q);
+        let b = third[1] - xf[1].fma(l, yf[1] * m).fma_by(2.0, b);
+        let c = xf[2].fma(l, yf[2] * m);
+        let c = third[2] - xf[1].fma(m, yf[1] * q).fma_by(2.0, c);
+        let d0 = xf[2].fma(m, yf[2] * q).fnma(3.0, third[3]);
+        let (a4, d4) = (a * 0.25, d0 * 0.25);
+        let harmonics = [(a + c) * 0.75, (b + d0) * 0.75, c.fnma(0.75, a4), b.fma_by(0.75, -d4)];
+        let tangential = [xf, yf];
+        Self {
+            area,
+            inv_area,
+            al,
+            be,
+            ga,
+            products,
+            n,
+            e1,
+            e2,
+            third,
+            tangential,
+            second,
+            harmonics,
+        }
     }
 
     /// Pulls adjoints of the frame quantities back to the nine derivatives.
+    ///
+    /// A change `(δS_u, δS_v)` is expressed in the frame: `w_ij = e_i · δ_j` and `ω_j = n · δ_j` with
+    /// `δ_1 = al δS_u` and `δ_2 = be δS_u + ga δS_v`. To stay orthonormal the frame's coefficients
+    /// change by `(al, 0; be, ga) ↦ (1 + M)(al, 0; be, ga)` with
+    /// `M = −(w_11, 0; w_12 + w_21, w_22)`; beside that the frame turns about `n` by `w_21` and leaves
+    /// the plane by `ω_1` and `ω_2`. So the adjoints of `w` and `ω` are sums over forms in the frame,
+    /// and only `D³S · n` asks for another vector.
     #[inline(always)]
     pub(crate) fn pull_back(&self, d: &Derivatives<S>, g: &FrameAdjoint<S>) -> Derivatives<S> {
         let (al, be, ga) = (self.al, self.be, self.ga);
+        let [aa, ab, ag, bb, bg, gg] = self.products;
         let [l, m, q] = self.second;
-        let (xf, yf, h) = (&self.xf, &self.yf, &self.h);
+        let [x, y] = &self.tangential;
         let [g1c, g1s, g3c, g3s] = g.harmonics;
-        let a = g1c * 0.75 + g3c * 0.25;
+        let a = g1c.fma_by(0.75, g3c * 0.25);
         let b = (g1s + g3s) * 0.75;
         let c = (g1c - g3c) * 0.75;
-        let w = g1s * 0.75 - g3s * 0.25;
-        let (a3, b2, c2, w3) = (a * 3.0, b * 2.0, c * 2.0, w * 3.0);
-        let xb = [-(a3.fma(l, b * m)), -(b2.fma(l, c2 * m)), -(c.fma(l, w3 * m))];
-        let yb = [-(a3.fma(m, b * q)), -(b2.fma(m, c2 * q)), -(c.fma(m, w3 * q))];
-        let ob = [
-            g.second[0] - a3.fma(xf[0], b2.fma(xf[1], c * xf[2])),
-            g.second[1]
-                - a3.fma(
-                    yf[0],
-                    b2.fma(yf[1], b.fma(xf[0], c2.fma(xf[1], c.fma(yf[2], w3 * xf[2])))),
-                ),
-            g.second[2] - b.fma(yf[0], c2.fma(yf[1], w3 * yf[2])),
-        ];
-        let (al2, be2, ga2) = (al * al, be * be, ga * ga);
+        let w = g1s.fma_by(0.75, -(g3s * 0.25));
+        let (a3, b2, c2, w3) = (a * 3.0, b + b, c + c, w * 3.0);
+        // Of D³S·n, on (u, v); its normals' adjoint is the only one that needs vectors.
+        let (along_u, along_v, b1) = (al.fma(c, be * w), ga * w, al * b);
         let hb = [
-            al2.fma(al.fma(a, be * b), be2.fma(al * c, be2 * be * w)),
-            ga * al2.fma(b, be * (al.fma(c2, be * w3))),
-            ga2 * al.fma(c, be * w3),
-            ga2 * ga * w,
+            (al * aa).fma(a, ab.fma(b1, bb * along_u)),
+            ag.fma(b1, bg.fma(along_u, bb * along_v)),
+            gg.fma(along_u, bg * along_v),
+            gg * along_v,
         ];
-        let t1 = be.fma(h[0], ga * h[1]);
-        let t2 = be.fma(h[1], ga * h[2]);
-        let t3 = be.fma(h[2], ga * h[3]);
-        let s1 = be.fma(t1, ga * t2);
-        let s2 = be.fma(t2, ga * t3);
-        let mut frame = [
-            al2.fma(h[0] * a3, al.fma(t1 * b2, s1 * c)),
-            al2.fma(h[0] * b, al.fma(t1 * c2, s1 * w3)),
-            al2.fma(h[1] * b, al.fma(t2 * c2, s2 * w3)),
-        ];
-        let pb = to_frame_adjoint([al, be, ga], &self.p, &ob, &mut frame);
-        let xb = to_frame_adjoint([al, be, ga], &self.x, &xb, &mut frame);
-        let yb = to_frame_adjoint([al, be, ga], &self.y, &yb, &mut frame);
-        let [mut alb, mut beb, mut gab] = frame;
-        let mut out = *d;
         let mut nb = scaled(&d[5], hb[0]);
-        let mut e1b = scaled(&d[2], xb[0]);
-        let mut e2b = scaled(&d[2], yb[0]);
         for k in 1..4 {
             nb = axpy(&d[5 + k], hb[k], &nb);
         }
+        // Of the forms in the frame; those of the tangential parts with the opposite sign.
+        let xb = [a3.fma(l, b * m), b2.fma(l, c2 * m), c.fma(l, w3 * m)];
+        let yb = [a3.fma(m, b * q), b2.fma(m, c2 * q), c.fma(m, w3 * q)];
+        let ob = [
+            g.second[0] - a3.fma(x[0], b2.fma(x[1], c * x[2])),
+            g.second[1]
+                - a3.fma(y[0], b2.fma(y[1], b.fma(x[0], c2.fma(x[1], c.fma(y[2], w3 * x[2]))))),
+            g.second[2] - b.fma(y[0], c2.fma(y[1], w3 * y[2])),
+        ];
+        // M in every form.
+        let t = &self.third;
+        let across = x[1].fma(xb[1], y[1].fma(yb[1], -(m * ob[1])));
+        let m11 = x[0].fma(xb[0], y[0].fma(yb[0], -(l * ob[0])));
+        let m22 = x[2].fma(xb[2], y[2].fma(yb[2], -(q * ob[2])));
+        let turned = x[1].fma(xb[2], y[1].fma(yb[2], -(m * ob[2])));
+        let m21 = x[0].fma(xb[1], y[0].fma(yb[1], -(l * ob[1])));
+        let m11 = m11.fma_by(2.0, across) - t[0].fma(a3, t[1].fma(b2, t[2] * c));
+        let m22 = m22.fma_by(2.0, across) - t[1].fma(b, t[2].fma(c2, t[3] * w3));
+        let m21 = turned.fma_by(2.0, m21) - t[0].fma(b, t[1].fma(c2, t[2] * w3));
+        let stretch = self.area * g.area;
+        let (w11, w22, w12) = (m11 + stretch, m22 + stretch, m21);
+        let w21 = m21 + (pair(&yb, x, -(xb[0] * y[0])) - xb[1].fma(y[1], xb[2] * y[2]));
+        let o1 = -pair(&xb, &self.second, pair(&ob, x, dot(&nb, &self.e1)));
+        let o2 = -pair(&yb, &self.second, pair(&ob, y, dot(&nb, &self.e2)));
+        let pb = from_frame(&self.products, &ob);
+        let xb = from_frame(&self.products, &xb);
+        let yb = from_frame(&self.products, &yb);
+        let (n, e1, e2) = (&self.n, &self.e1, &self.e2);
+        let mut out = *d;
         for k in 0..3 {
-            nb = axpy(&d[2 + k], pb[k], &nb);
-            if k > 0 {
-                e1b = axpy(&d[2 + k], xb[k], &e1b);
-                e2b = axpy(&d[2 + k], yb[k], &e2b);
-            }
-            out[2 + k] = axpy(&self.n, pb[k], &axpy(&self.e1, xb[k], &scaled(&self.e2, yb[k])));
+            let (p, x, y) = (pb[k], -xb[k], -yb[k]);
+            out[2 + k] = axpy(n, p, &axpy(e1, x, &scaled(e2, y)));
         }
         for k in 0..4 {
-            out[5 + k] = scaled(&self.n, hb[k]);
+            out[5 + k] = scaled(n, hb[k]);
         }
-        alb = alb + dot(&e1b, &d[0]);
-        beb = beb + dot(&e2b, &d[0]);
-        gab = gab + dot(&e2b, &d[1]);
-        // al = E^(−1/2), ga = E^(1/2)/J, be = −F al/J.
-        let fb = -(beb * al * self.inv_area);
-        alb = alb - beb * self.f * self.inv_area;
-        let mut inv_b = -(beb * self.f * al) + gab * (self.e * al);
-        let eb2 = gab * self.inv_area * al - alb * al * al2;
-        inv_b = inv_b + dot(&nb, &self.n) * self.area;
-        let area_b = g.area - inv_b * self.inv_area * self.inv_area;
-        let normal_b = axpy(&nb, self.inv_area, &scaled(&self.n, area_b));
-        out[0] = axpy(
-            &e1b,
-            al,
-            &axpy(&e2b, be, &axpy(&d[0], eb2, &axpy(&d[1], fb, &cross(&d[1], &normal_b)))),
-        );
-        out[1] = axpy(&e2b, ga, &axpy(&d[0], fb, &cross(&normal_b, &d[0])));
+        let (u1, u2, un) = (al.fma(w11, be * w12), al.fma(w21, be * w22), al.fma(o1, be * o2));
+        out[0] = axpy(e1, u1, &axpy(e2, u2, &scaled(n, un)));
+        out[1] = axpy(e1, ga * w12, &axpy(e2, ga * w22, &scaled(n, ga * o2)));
         out
     }
 
-    /// The density times the area element, and the adjoints of that product.
+    /// The density times the area element and `weight`, and the adjoints of that product.
     #[inline(always)]
-    pub(crate) fn density(&self, w: &Density) -> (Lanes<S>, FrameAdjoint<S>) {
+    pub(crate) fn density(&self, w: &Density, weight: Lanes<S>) -> (Lanes<S>, FrameAdjoint<S>) {
         let simd = self.area.0;
-        let j = self.area;
+        let j = self.area * weight;
         let [l, m, q] = self.second;
         let [f1c, f1s, f3c, f3s] = self.harmonics;
         let first = f1c.fma(f1c, f1s * f1s);
         let third = f3c.fma(f3c, f3s * f3s);
-        let bending = l.fma(l, q * q);
-        let twist = m * m;
-        let mut e = bending * w.square
-            + (l * q) * w.product
-            + twist * w.twist
-            + (l + q) * (0.5 * w.mean)
-            + first * w.f1
-            + third * w.f3;
-        if w.absolute != 0.0 {
-            e = e + (l * q - twist).abs() * w.absolute;
-        }
-        let mut k1 = Lanes::splat(simd, 2.0 * w.f1);
-        let mut k3 = Lanes::splat(simd, 2.0 * w.f3);
+        let mut e = first.fma_by(w.f1, third * w.f3);
+        let mut k1 = j * (2.0 * w.f1);
+        let mut k3 = j * (2.0 * w.f3);
         if w.root != 0.0 {
             let root = (first + third + Lanes::splat(simd, w.root_epsilon * w.root_epsilon)).sqrt();
             e = e + root * w.root;
-            let slope = root.recip() * w.root;
+            let slope = root.recip() * j * w.root;
             k1 = k1 + slope;
             k3 = k3 + slope;
         }
         let mut harmonics = [k1 * f1c, k1 * f1s, k3 * f3c, k3 * f3s];
-        let mut lb = l * (2.0 * w.square) + q * w.product + Lanes::splat(simd, 0.5 * w.mean);
-        let mut qb = q * (2.0 * w.square) + l * w.product + Lanes::splat(simd, 0.5 * w.mean);
-        let mut mb = m * (2.0 * w.twist);
+        let mut second = [Lanes::splat(simd, 0.0); 3];
+        if w.has_second_order() {
+            let twist = m * m;
+            e = e
+                + l.fma(l, q * q) * w.square
+                + (l * q) * w.product
+                + twist * w.twist
+                + (l + q) * (0.5 * w.mean);
+            if w.absolute != 0.0 {
+                e = e + (l * q - twist).abs() * w.absolute;
+            }
+            let mean = Lanes::splat(simd, 0.5 * w.mean);
+            second = [
+                (l * (2.0 * w.square) + q * w.product + mean) * j,
+                m * (2.0 * w.twist) * j,
+                (q * (2.0 * w.square) + l * w.product + mean) * j,
+            ];
+        }
         if w.coupling != 0.0 {
             let half = (l - q) * 0.5;
+            let twist = m * m;
             let cos = half.fma(half, -twist);
             let sin = half * m * 2.0;
             // The last summand keeps a flat point, where all vanishes, from dividing by zero.
             let size = half.fma(half, twist)
-                + (bending + twist * 2.0) * GUARD
+                + (l.fma(l, q * q) + twist * 2.0) * GUARD
                 + Lanes::splat(simd, 1e-200);
-            let scale = size.recip() * w.coupling;
+            let inverse = size.recip();
+            let scale = inverse * w.coupling;
             let zr = f1c.fma(f3c, -(f1s * f3s));
             let zi = -(f1c.fma(f3s, f1s * f3c));
             let value = zr.fma(cos, -(zi * sin)) * scale;
             e = e + value;
+            let scale = scale * j;
             let (zrb, zib) = (scale * cos, -(scale * sin));
             let (cosb, sinb) = (scale * zr, -(scale * zi));
-            let sizeb = -(value * size.recip());
+            let sizeb = -(value * inverse * j);
             harmonics[0] = harmonics[0] + zrb * f3c - zib * f3s;
             harmonics[1] = harmonics[1] - zrb * f3s - zib * f3c;
             harmonics[2] = harmonics[2] + zrb * f1c - zib * f1s;
             harmonics[3] = harmonics[3] - zrb * f1s - zib * f1c;
             let halfb = (cosb * half + sinb * m + sizeb * half) * 2.0;
             let guard = sizeb * (2.0 * GUARD);
-            lb = lb + halfb * 0.5 + guard * l;
-            qb = qb - halfb * 0.5 + guard * q;
-            mb = mb + (sinb * half - cosb * m + sizeb * m) * 2.0 + guard * m * 2.0;
+            second[0] = second[0] + halfb * 0.5 + guard * l;
+            second[2] = second[2] - halfb * 0.5 + guard * q;
+            second[1] = second[1] + (sinb * half - cosb * m + sizeb * m) * 2.0 + guard * m * 2.0;
         }
-        let (mut value, mut area) = (e * j, e);
+        let (mut value, mut area) = (e * j, e * weight);
         if w.barrier != 0.0 {
-            let barrier = self.inv_area * w.barrier;
+            let barrier = self.inv_area * weight * w.barrier;
             value = value + barrier;
             area = area - barrier * self.inv_area;
         }
-        let adjoint = FrameAdjoint {
-            harmonics: [harmonics[0] * j, harmonics[1] * j, harmonics[2] * j, harmonics[3] * j],
-            second: [lb * j, mb * j, qb * j],
-            area,
-        };
-        (value, adjoint)
+        (value, FrameAdjoint { harmonics, second, area })
     }
 
-    /// Adjoints of the area element by `S_u` and `S_v`.
+    /// Adjoints by `S_u` and `S_v` of the area element times `weight`.
     #[inline(always)]
-    pub(crate) fn area_adjoint(&self, d: &Derivatives<S>) -> [Vec3<S>; 2] {
-        [cross(&d[1], &self.n), cross(&self.n, &d[0])]
+    pub(crate) fn area_adjoint(&self, weight: Lanes<S>) -> [Vec3<S>; 2] {
+        // The element grows with the part of δS_u and δS_v that lies in the tangent plane.
+        let j = self.area * weight;
+        let along = scaled(&self.e2, j * self.be);
+        [axpy(&self.e1, j * self.al, &along), scaled(&self.e2, j * self.ga)]
     }
 }

@@ -9,7 +9,7 @@ use rayon::prelude::*;
 use subdiv_catmull_clark::{BasisId, SubdivisionSurface};
 
 /// Patches a worker takes at a time, so that sums do not depend on how the work was divided.
-const RUN: usize = 8;
+const RUN: usize = 16;
 
 pub(crate) enum Rule {
     Separable(SeparableRule),

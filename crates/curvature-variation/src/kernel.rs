@@ -1,13 +1,9 @@
-//! Energy, area and their gradients of one patch, a vector of samples at a time.
+//! Energy, area and their gradients of one patch, a vector of samples or of patches at a time.
 
 use crate::density::{Density, Derivatives, Shape};
-use crate::lanes::{Lanes, Vec3, scaled};
+use crate::lanes::{Aligned, Lanes, Vec3, align_frame, axpy, cross, dot, scaled};
 use crate::rules::{SeparableRule, Table};
 use pulp::{Simd, WithSimd, bytemuck};
-
-/// Orders of the nine derivatives.
-pub(crate) const ORDER_U: [usize; 9] = [1, 0, 2, 1, 0, 3, 2, 1, 0];
-pub(crate) const ORDER_V: [usize; 9] = [0, 1, 0, 1, 2, 0, 1, 2, 3];
 
 /// What a pass computes.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -64,47 +60,20 @@ fn sample<S: Simd>(d: &Derivatives<S>, weight: Lanes<S>, task: Task<'_>) -> Samp
     let shape = Shape::new(d);
     let area = shape.area * weight;
     if let Task::Gradient(density) = task {
-        let (value, adjoint) = shape.density(density);
-        let [u, v] = shape.area_adjoint(d);
+        let (integral, adjoint) = shape.density(density, weight);
         return Sampled {
             area,
-            integral: value * weight,
-            adjoint: shape.pull_back(d, &adjoint.scaled(weight)),
-            area_adjoint: [scaled(&u, weight), scaled(&v, weight)],
+            integral,
+            adjoint: shape.pull_back(d, &adjoint),
+            area_adjoint: shape.area_adjoint(weight),
         };
     }
     let integral = match task {
-        Task::Energy(density) => shape.density(density).0 * weight,
+        Task::Energy(density) => shape.density(density, weight).0,
         _ => Lanes::splat(weight.0, 0.0),
     };
     let nothing = zero(weight.0);
     Sampled { area, integral, adjoint: [nothing; 9], area_adjoint: [nothing; 2] }
-}
-
-/// Adds the sums over the lanes of each vector to `out`.
-#[inline(always)]
-fn add_lanes<S: Simd>(vectors: &[S::f64s], out: &mut [f64]) {
-    let values: &[f64] = bytemuck::cast_slice(vectors);
-    // One after the other they would each take as many operations as four together.
-    match S::F64_LANES {
-        4 => {
-            for (sum, v) in out.iter_mut().zip(values.as_chunks::<4>().0) {
-                *sum += (v[0] + v[1]) + (v[2] + v[3]);
-            }
-        }
-        8 => {
-            for (sum, v) in out.iter_mut().zip(values.as_chunks::<8>().0) {
-                *sum += ((v[0] + v[1]) + (v[2] + v[3])) + ((v[4] + v[5]) + (v[6] + v[7]));
-            }
-        }
-        lanes => {
-            for (sum, v) in out.iter_mut().zip(values.chunks_exact(lanes)) {
-                for x in v {
-                    *sum += x;
-                }
-            }
-        }
-    }
 }
 
 /// The first `3 · groups` derivatives at one vector of samples, from the table's weights (which
@@ -165,12 +134,13 @@ impl WithSimd for PatchRun<'_, Table> {
 
     #[inline(always)]
     fn with_simd<S: Simd>(self, simd: S) {
+        align_frame();
         let count = self.per_patch;
         let rule = self.rule;
         let (values, _) = S::as_simd_f64s(&rule.values);
         let (weights, _) = S::as_simd_f64s(&rule.weights);
         let with_gradient = matches!(self.task, Task::Gradient(_));
-        let mut sums = vec![[zero(simd); 2]; if with_gradient { count } else { 0 }];
+        let mut sums = vec![Aligned([zero(simd); 2]); if with_gradient { count } else { 0 }];
         let mut points = vec![[0.0; 3]; count];
         self.gradients.fill(0.0);
         let groups = if self.task == Task::Area { 1 } else { 3 };
@@ -179,7 +149,7 @@ impl WithSimd for PatchRun<'_, Table> {
             gather(self.positions, controls, &mut points);
             let mut area = Lanes::splat(simd, 0.0);
             let mut integral = area;
-            sums.fill([zero(simd); 2]);
+            sums.fill(Aligned([zero(simd); 2]));
             for (chunk, &w) in weights.iter().enumerate() {
                 let place = rule.chunk(chunk, S::F64_LANES);
                 let d = table_derivatives(simd, values, place, &points, groups);
@@ -193,12 +163,12 @@ impl WithSimd for PatchRun<'_, Table> {
                         let g = table_adjoint(simd, values, place, (k, count), &s.adjoint);
                         let tu = Lanes(simd, values[start + k * step]);
                         let tv = Lanes(simd, values[start + (count + k) * step]);
-                        let [mut now, mut now_area] = *sum;
+                        let [mut now, mut now_area] = sum.0;
                         for c in 0..3 {
                             now[c] = now[c] + g[c];
                             now_area[c] = tu.fma(au[c], tv.fma(av[c], now_area[c]));
                         }
-                        *sum = [now, now_area];
+                        sum.0 = [now, now_area];
                     }
                 }
             }
@@ -208,8 +178,8 @@ impl WithSimd for PatchRun<'_, Table> {
                 for (&place, sum) in places.iter().zip(&sums) {
                     let g = &mut self.gradients[GRADIENT_LEN * place as usize..][..GRADIENT_LEN];
                     for c in 0..3 {
-                        g[c] += sum[0][c].sum();
-                        g[3 + c] += sum[1][c].sum();
+                        g[c] += sum.0[0][c].sum();
+                        g[3 + c] += sum.0[1][c].sum();
                     }
                 }
             }
@@ -217,127 +187,189 @@ impl WithSimd for PatchRun<'_, Table> {
     }
 }
 
+/// The values of a basis function at one node of a rule: `[order][k]`, the same in all lanes.
+type Basis<S> = [[Lanes<S>; 4]; 4];
+
+/// `Σ t_k v_k`.
+#[inline(always)]
+fn along<S: Simd>(t: &[Lanes<S>; 4], v: &[Vec3<S>; 4]) -> Vec3<S> {
+    let mut sum = scaled(&v[0], t[0]);
+    for k in 1..4 {
+        sum = axpy(&v[k], t[k], &sum);
+    }
+    sum
+}
+
+/// The nine derivatives at a node from the derivatives along v (`rows[order][i]`).
+#[inline(always)]
+fn derivatives_along_u<S: Simd>(t: &Basis<S>, rows: &[[Vec3<S>; 4]; 4]) -> Derivatives<S> {
+    [
+        along(&t[1], &rows[0]),
+        along(&t[0], &rows[1]),
+        along(&t[2], &rows[0]),
+        along(&t[1], &rows[1]),
+        along(&t[0], &rows[2]),
+        along(&t[3], &rows[0]),
+        along(&t[2], &rows[1]),
+        along(&t[1], &rows[2]),
+        along(&t[0], &rows[3]),
+    ]
+}
+
+/// Adjoints at one node: of the derivatives for the integral, of the first two for the area.
+#[derive(Clone, Copy)]
+struct NodeAdjoint<S: Simd> {
+    integral: Derivatives<S>,
+    area: [Vec3<S>; 2],
+}
+
+/// Adjoints of the derivatives along v, `[order][i]`: four orders of the integral, two of the area.
+#[inline(always)]
+fn back_along_u<S: Simd>(
+    simd: S,
+    basis: &[Aligned<Basis<S>>],
+    nodes: &[Aligned<NodeAdjoint<S>>],
+    back: &mut [[Vec3<S>; 4]; 6],
+) {
+    for i in 0..4 {
+        // In two rounds, whose sums fit into registers.
+        let mut sums = [zero(simd); 2];
+        for (Aligned(t), Aligned(node)) in basis.iter().zip(nodes) {
+            let a = &node.integral;
+            sums[0] = axpy(&a[0], t[1][i], &sums[0]);
+            sums[1] = axpy(&node.area[0], t[1][i], &sums[1]);
+            sums[0] = axpy(&a[2], t[2][i], &sums[0]);
+            sums[0] = axpy(&a[5], t[3][i], &sums[0]);
+        }
+        [back[0][i], back[4][i]] = sums;
+        let mut sums = [zero(simd); 4];
+        for (Aligned(t), Aligned(node)) in basis.iter().zip(nodes) {
+            let a = &node.integral;
+            sums[0] = axpy(&a[1], t[0][i], &sums[0]);
+            sums[1] = axpy(&a[4], t[0][i], &sums[1]);
+            sums[2] = axpy(&a[8], t[0][i], &sums[2]);
+            sums[3] = axpy(&node.area[1], t[0][i], &sums[3]);
+            sums[0] = axpy(&a[3], t[1][i], &sums[0]);
+            sums[1] = axpy(&a[7], t[1][i], &sums[1]);
+            sums[0] = axpy(&a[6], t[2][i], &sums[0]);
+        }
+        [back[1][i], back[2][i], back[3][i], back[5][i]] = sums;
+    }
+}
+
+/// Patches side by side in the lanes: nothing has to be summed over lanes, and every table value is
+/// the same in all of them.
 impl WithSimd for PatchRun<'_, SeparableRule> {
     type Output = ();
 
     #[inline(always)]
     fn with_simd<S: Simd>(self, simd: S) {
+        align_frame();
         let rule = self.rule;
-        let lanes_per_row = rule.padded / S::F64_LANES;
-        // Whole vectors of padding are skipped.
-        let chunks = rule.nodes.div_ceil(S::F64_LANES);
-        let (basis, _) = S::as_simd_f64s(&rule.basis);
-        let (weights, _) = S::as_simd_f64s(&rule.weights);
+        let lanes = S::F64_LANES;
         let with_gradient = matches!(self.task, Task::Gradient(_));
-        let orders = if self.task == Task::Area { 2 } else { 4 };
-        self.gradients.fill(0.0);
-        // Overwritten by every patch, and so outside the loop, which would clear them each time.
-        let mut rows = [[zero(simd); 4]; 4];
-        let mut at = [[Lanes::splat(simd, 0.0); 4]; 4];
-        let mut d: Derivatives<S> = [zero(simd); 9];
-        let nothing = simd.splat_f64s(0.0);
-        let mut sums = [nothing; 16 * GRADIENT_LEN];
-        for (patch, integrals) in self.integrals.iter_mut().enumerate() {
-            let controls: &[u32; 16] = match self.controls[16 * patch..].first_chunk() {
-                Some(controls) => controls,
-                None => return,
-            };
-            let mut points = [[0.0; 3]; 16];
-            for (point, &k) in points.iter_mut().zip(&rule.order) {
-                let v = 3 * controls[k] as usize;
-                point.copy_from_slice(&self.positions[v..v + 3]);
+        let nothing = zero(simd);
+        let mut basis = Vec::with_capacity(rule.nodes);
+        for values in &rule.basis {
+            let mut t = [[nothing[0]; 4]; 4];
+            for order in 0..4 {
+                for k in 0..4 {
+                    t[order][k] = Lanes::splat(simd, values[order][k]);
+                }
             }
-            let mut area = Lanes::splat(simd, 0.0);
-            let mut integral = area;
-            for chunk in 0..chunks {
+            basis.push(Aligned(t));
+        }
+        self.gradients.fill(0.0);
+        // Overwritten again and again, and so outside the loops, which would clear them each time.
+        let mut adjoints = Vec::with_capacity(rule.nodes);
+        let mut coordinates = Aligned([nothing[0].1; 48]);
+        let mut points = Aligned([[nothing; 4]; 4]);
+        let mut rows = Aligned([[nothing; 4]; 4]);
+        let mut back = Aligned([[nothing; 4]; 6]);
+        let mut sums = Aligned([nothing[0].1; 16 * GRADIENT_LEN]);
+        let patches = self.integrals.len();
+        for first in (0..patches).step_by(lanes) {
+            // Lanes without a patch repeat the last one.
+            let flat: &mut [f64] = bytemuck::cast_slice_mut(&mut coordinates.0);
+            for lane in 0..lanes {
+                let patch = (first + lane).min(patches - 1);
+                let controls = &self.controls[16 * patch..][..16];
+                for (point, &k) in flat.chunks_exact_mut(3 * lanes).zip(&rule.order) {
+                    let v = 3 * controls[k] as usize;
+                    let p = &self.positions[v..v + 3];
+                    point[lane] = p[0];
+                    point[lanes + lane] = p[1];
+                    point[2 * lanes + lane] = p[2];
+                }
+            }
+            for (k, p) in coordinates.0.as_chunks::<3>().0.iter().enumerate() {
+                points.0[k / 4][k % 4] = [Lanes(simd, p[0]), Lanes(simd, p[1]), Lanes(simd, p[2])];
+            }
+            let (mut area, mut integral) = (nothing[0], nothing[0]);
+            for (v, Aligned(tv)) in basis.iter().enumerate() {
                 // Along v for every row of control points, then along u for every node.
+                let orders = if self.task == Task::Area { 2 } else { 4 };
                 for order in 0..orders {
                     for i in 0..4 {
-                        let mut sum = zero(simd);
-                        for j in 0..4 {
-                            let t = Lanes(simd, basis[(4 * order + j) * lanes_per_row + chunk]);
-                            let p = &points[4 * i + j];
-                            for c in 0..3 {
-                                sum[c] = t.fma(Lanes::splat(simd, p[c]), sum[c]);
-                            }
-                        }
-                        rows[order][i] = sum;
+                        rows.0[order][i] = along(&tv[order], &points.0[i]);
                     }
                 }
-                let mut back = [[zero(simd); 4]; 4];
-                let mut area_back = [[zero(simd); 4]; 2];
-                for node in 0..rule.nodes {
-                    for (order, at) in at.iter_mut().enumerate() {
-                        for (i, at) in at.iter_mut().enumerate() {
-                            let value = rule.basis[(4 * order + i) * rule.padded + node];
-                            *at = Lanes::splat(simd, value);
-                        }
+                let weights = &rule.weights[v * rule.nodes..][..rule.nodes];
+                adjoints.clear();
+                for (Aligned(t), &weight) in basis.iter().zip(weights) {
+                    let weight = Lanes::splat(simd, weight);
+                    if self.task == Task::Area {
+                        let normal = cross(&along(&t[1], &rows.0[0]), &along(&t[0], &rows.0[1]));
+                        area = dot(&normal, &normal).sqrt().fma(weight, area);
+                        continue;
                     }
-                    let needed = if self.task == Task::Area { 2 } else { 9 };
-                    for k in 0..needed {
-                        let mut sum = zero(simd);
-                        for i in 0..4 {
-                            let (t, row) = (at[ORDER_U[k]][i], &rows[ORDER_V[k]][i]);
-                            for c in 0..3 {
-                                sum[c] = t.fma(row[c], sum[c]);
-                            }
-                        }
-                        d[k] = sum;
-                    }
-                    let weight = Lanes(simd, weights[node * lanes_per_row + chunk]);
-                    let s = sample(&d, weight, self.task);
+                    let s = sample(&derivatives_along_u(t, &rows.0), weight, self.task);
                     area = area + s.area;
                     integral = integral + s.integral;
                     if with_gradient {
-                        // Collected by the order along v, so that each sum is touched once.
-                        let (a, [au, av]) = (&s.adjoint, &s.area_adjoint);
-                        for i in 0..4 {
-                            let t = [at[0][i], at[1][i], at[2][i], at[3][i]];
-                            for c in 0..3 {
-                                back[0][i][c] = t[1].fma(
-                                    a[0][c],
-                                    t[2].fma(a[2][c], t[3].fma(a[5][c], back[0][i][c])),
-                                );
-                                back[1][i][c] = t[0].fma(
-                                    a[1][c],
-                                    t[1].fma(a[3][c], t[2].fma(a[6][c], back[1][i][c])),
-                                );
-                                back[2][i][c] = t[0].fma(a[4][c], t[1].fma(a[7][c], back[2][i][c]));
-                                back[3][i][c] = t[0].fma(a[8][c], back[3][i][c]);
-                                area_back[0][i][c] = t[1].fma(au[c], area_back[0][i][c]);
-                                area_back[1][i][c] = t[0].fma(av[c], area_back[1][i][c]);
-                            }
-                        }
+                        adjoints.push(Aligned(NodeAdjoint {
+                            integral: s.adjoint,
+                            area: s.area_adjoint,
+                        }));
                     }
                 }
                 if with_gradient {
+                    back_along_u(simd, &basis, &adjoints, &mut back.0);
                     for j in 0..4 {
-                        let mut t = [Lanes::splat(simd, 0.0); 4];
-                        for (order, t) in t.iter_mut().enumerate() {
-                            *t = Lanes(simd, basis[(4 * order + j) * lanes_per_row + chunk]);
-                        }
+                        let t = [tv[0][j], tv[1][j], tv[2][j], tv[3][j]];
                         for i in 0..4 {
-                            let k = GRADIENT_LEN * (4 * i + j);
+                            let sums = &mut sums.0[GRADIENT_LEN * (4 * i + j)..][..GRADIENT_LEN];
                             for c in 0..3 {
-                                let before = if chunk > 0 { sums[k + c] } else { nothing };
-                                let mut sum = t[0].fma(back[0][i][c], Lanes(simd, before));
+                                let before = if v > 0 { sums[c] } else { nothing[0].1 };
+                                let mut sum = t[0].fma(back.0[0][i][c], Lanes(simd, before));
                                 for order in 1..4 {
-                                    sum = t[order].fma(back[order][i][c], sum);
+                                    sum = t[order].fma(back.0[order][i][c], sum);
                                 }
-                                sums[k + c] = sum.1;
-                                let before = if chunk > 0 { sums[k + 3 + c] } else { nothing };
-                                let sum = t[1].fma(area_back[1][i][c], Lanes(simd, before));
-                                sums[k + 3 + c] = t[0].fma(area_back[0][i][c], sum).1;
+                                sums[c] = sum.1;
+                                let before = if v > 0 { sums[3 + c] } else { nothing[0].1 };
+                                let sum = t[1].fma(back.0[5][i][c], Lanes(simd, before));
+                                sums[3 + c] = t[0].fma(back.0[4][i][c], sum).1;
                             }
                         }
                     }
                 }
             }
-            *integrals = [area.sum(), integral.sum()];
-            if with_gradient {
-                for (&k, sums) in rule.order.iter().zip(sums.chunks_exact(GRADIENT_LEN)) {
-                    let place = GRADIENT_LEN * self.places[16 * patch + k] as usize;
-                    add_lanes::<S>(sums, &mut self.gradients[place..place + GRADIENT_LEN]);
+            let (area, integral) = ([area.1], [integral.1]);
+            let (areas, values): (&[f64], &[f64]) =
+                (bytemuck::cast_slice(&area), bytemuck::cast_slice(&integral));
+            let flat: &[f64] = bytemuck::cast_slice(&sums.0);
+            for lane in 0..lanes.min(patches - first) {
+                let patch = first + lane;
+                self.integrals[patch] = [areas[lane], values[lane]];
+                if with_gradient {
+                    let places = &self.places[16 * patch..][..16];
+                    for (sums, &k) in flat.chunks_exact(GRADIENT_LEN * lanes).zip(&rule.order) {
+                        let place = GRADIENT_LEN * places[k] as usize;
+                        let out = &mut self.gradients[place..][..GRADIENT_LEN];
+                        for (out, sums) in out.iter_mut().zip(sums.chunks_exact(lanes)) {
+                            *out += sums[lane];
+                        }
+                    }
                 }
             }
         }

@@ -3,6 +3,21 @@
 use pulp::Simd;
 use std::ops::{Add, Mul, Neg, Sub};
 
+/// Begins with a line of the cache.
+#[derive(Clone, Copy)]
+#[repr(align(64))]
+pub(crate) struct Aligned<T>(pub(crate) T);
+
+/// Makes the compiler align the vectors that the calling function keeps on the stack.
+///
+/// A vector in memory is no more aligned than a number, and those that do not fit into registers
+/// follow the stack as it comes, unless a variable asks for more. Without, every second access may
+/// touch two lines of the cache, which cost a fifth of the time or nothing, as luck would have it.
+#[inline(always)]
+pub(crate) fn align_frame() {
+    std::hint::black_box(&Aligned(0_u64));
+}
+
 /// A few samples' values side by side.
 pub(crate) struct Lanes<S: Simd>(pub(crate) S, pub(crate) S::f64s);
 
@@ -25,6 +40,18 @@ impl<S: Simd> Lanes<S> {
     #[inline(always)]
     pub(crate) fn fma(self, a: Self, b: Self) -> Self {
         Self(self.0, self.0.mul_add_e_f64s(self.1, a.1, b.1))
+    }
+
+    /// `b − self · a` with the same `a` in all lanes.
+    #[inline(always)]
+    pub(crate) fn fnma(self, a: f64, b: Self) -> Self {
+        self.fma_by(-a, b)
+    }
+
+    /// `self · a + b` with the same `a` in all lanes.
+    #[inline(always)]
+    pub(crate) fn fma_by(self, a: f64, b: Self) -> Self {
+        self.fma(Self::splat(self.0, a), b)
     }
 
     #[inline(always)]

@@ -5,7 +5,7 @@ use crate::density::{Density, FrameAdjoint, Shape};
 use crate::evaluator::{Group, SurfaceEnergy};
 use crate::freedom::Freedom;
 use crate::kernel::{gather, table_adjoint, table_derivatives};
-use crate::lanes::Lanes;
+use crate::lanes::{Lanes, align_frame};
 use crate::rules::{MAX_LANES, Table};
 use gp_solver::{SolverError, SparseCholesky, SymmetricPattern};
 use pulp::{Simd, WithSimd};
@@ -369,6 +369,7 @@ impl WithSimd for ElementMatrix<'_> {
 
     #[inline(always)]
     fn with_simd<S: Simd>(self, simd: S) {
+        align_frame();
         let count = self.controls.len();
         let width = element_width(count);
         let table = &self.rule.table;

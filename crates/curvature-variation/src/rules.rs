@@ -69,11 +69,9 @@ pub(crate) fn quartered(n: usize) -> Vec<(f64, f64)> {
 #[derive(Clone, Debug)]
 pub(crate) struct SeparableRule {
     pub(crate) nodes: usize,
-    /// Nodes rounded up to whole vectors.
-    pub(crate) padded: usize,
-    /// `basis[(4 d + k) · padded + node]`: derivative `d` of B-spline `k`.
-    pub(crate) basis: Vec<f64>,
-    /// `weights[u node · padded + v node]`, zero in the padding.
+    /// `basis[node][d][k]`: derivative `d` of B-spline `k`.
+    pub(crate) basis: Vec<[[f64; 4]; 4]>,
+    /// `weights[i · nodes + j]` of a pair of nodes.
     pub(crate) weights: Vec<f64>,
     /// Position of grid point `4 i + j` among the patch's control points.
     pub(crate) order: [usize; 16],
@@ -84,24 +82,9 @@ impl SeparableRule {
         let grid = surface.b_spline_grid(basis)?;
         let order = std::array::from_fn(|k| grid[k][0].0);
         let rule = gauss_legendre(nodes);
-        let padded = nodes.next_multiple_of(MAX_LANES);
-        let mut values = vec![0.0; 16 * padded];
-        let mut weights = vec![0.0; nodes * padded];
-        for node in 0..padded {
-            // The padding repeats the last node with weight zero, so that nothing divides by zero.
-            let table = cubic_basis(rule[node.min(nodes - 1)].0);
-            for (d, row) in table.iter().enumerate() {
-                for (k, &value) in row.iter().enumerate() {
-                    values[(4 * d + k) * padded + node] = value;
-                }
-            }
-        }
-        for (i, &(_, wu)) in rule.iter().enumerate() {
-            for (j, &(_, wv)) in rule.iter().enumerate() {
-                weights[i * padded + j] = wu * wv;
-            }
-        }
-        Some(Self { nodes, padded, basis: values, weights, order })
+        let basis = rule.iter().map(|&(x, _)| cubic_basis(x)).collect();
+        let weights = rule.iter().flat_map(|a| rule.iter().map(|b| a.1 * b.1)).collect();
+        Some(Self { nodes, basis, weights, order })
     }
 }
 
