@@ -61,7 +61,7 @@ impl Default for FairOptions {
         Self {
             energy: Energy::default(),
             levels: 2,
-            iterations: 400,
+            iterations: 2000,
             method: Method::default(),
             blend: Blend::default(),
             quadrature: Quadrature::NORMAL,
