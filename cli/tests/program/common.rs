@@ -21,6 +21,13 @@ pub(crate) fn message(output: &Output) -> String {
     String::from_utf8_lossy(&output.stderr).into_owned()
 }
 
+/// Writes an input file into `folder` and returns its path.
+pub(crate) fn write_into(folder: &tempfile::TempDir, name: &str, text: &str) -> String {
+    let path = folder.path().join(name);
+    fs::write(&path, text).expect("written");
+    path.display().to_string()
+}
+
 /// A refusal with `-o` of this file name: exit code 2, a message with these words, nothing written.
 pub(crate) fn refused(args: &[&str], out: &str, words: &[&str]) {
     let folder = tempfile::tempdir().expect("a folder");

@@ -2,7 +2,7 @@
 
 #![allow(clippy::unwrap_used, reason = "a test may stop at the first surprise")]
 
-use crate::common::{message, root, umbilic};
+use crate::common::{message, root, umbilic, write_into};
 use std::fs;
 use std::path::Path;
 use std::process::{Command, Output};
@@ -125,11 +125,7 @@ fn usage_errors_exit_with_2() {
 #[test]
 fn bad_input_is_one_sentence_with_the_file() {
     let folder = tempfile::tempdir().unwrap();
-    let write = |name: &str, text: &str| {
-        let path = folder.path().join(name);
-        fs::write(&path, text).unwrap();
-        path.to_str().unwrap().to_owned()
-    };
+    let write = |name: &str, text: &str| write_into(&folder, name, text);
     let step = fs::read_to_string(root().join("fixtures/saddle.step")).unwrap();
     let truncated = write("cut.step", &step[..1500]);
     let no_surface = write("none.step", "ISO-10303-21;\nDATA;\nENDSEC;\nEND-ISO-10303-21;\n");

@@ -1,6 +1,6 @@
 //! `umbilic hnet` and `umbilic darboux` from the outside: files, exit codes, messages.
 
-use crate::common::{refused, umbilic};
+use crate::common::{refused, umbilic, write_into};
 use std::fs;
 
 /// `n` × `n` quads over the saddle `z = x y`, whose asymptotic lines are the grid.
@@ -58,11 +58,7 @@ fn a_net_is_written_in_every_format_and_read_again() {
 #[test]
 fn nets_that_cannot_be_skinned_are_refused_with_a_remedy() {
     let folder = tempfile::tempdir().expect("a folder");
-    let write = |name: &str, text: &str| {
-        let path = folder.path().join(name);
-        fs::write(&path, text).expect("written");
-        path.display().to_string()
-    };
+    let write = |name: &str, text: &str| write_into(&folder, name, text);
     let saddle = saddle(4);
     let split = saddle.replace("f 1 6 7 2\n", "f 1 6 7\nf 1 7 2\n");
     refused(&["hnet", &write("t.obj", &split)], "a.ron", &["3 corners", "remesh"]);

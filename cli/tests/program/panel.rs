@@ -2,7 +2,7 @@
 
 #![allow(clippy::unwrap_used, reason = "a test may stop at the first surprise")]
 
-use crate::common::umbilic;
+use crate::common::{umbilic, write_into};
 use std::fs;
 use std::process::Output;
 
@@ -27,11 +27,7 @@ fn refused(args: &[&str], want: &str) {
 #[test]
 fn bad_input_is_one_sentence() {
     let folder = tempfile::tempdir().unwrap();
-    let write = |name: &str, text: &str| {
-        let path = folder.path().join(name);
-        fs::write(&path, text).unwrap();
-        path.display().to_string()
-    };
+    let write = |name: &str, text: &str| write_into(&folder, name, text);
     let square = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\n";
     let outside = write("outside.obj", "v 0 0 0\nv 3 0 0\nv 3 1 0\nv 0 1 0\nf 1 2 3 4\n");
     let crossed = write("crossed.obj", &format!("{square}f 1 3 2 4\n"));

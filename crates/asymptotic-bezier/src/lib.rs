@@ -44,6 +44,7 @@ mod joint;
 mod lamella;
 mod mask;
 mod net;
+mod normal_blocks;
 mod normal_curve;
 mod normal_net;
 mod patch;

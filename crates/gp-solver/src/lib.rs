@@ -1,8 +1,8 @@
 //! Sparse nonlinear least squares and the other optimisers the methods of the workspace stand on.
 //!
 //! A [`Problem`] is a vector of unknowns and blocks: [`ResidualBlock`]s (rows that share their
-//! unknowns come as [`Elements`]), [`EnergyBlock`]s, and [`QuadraticConstraints`] from coefficient
-//! triplets. [`solve`] minimises it by Levenberg-Marquardt or undamped guided projection
+//! unknowns come as [`Elements`]; [`Closeness`] is ready made), [`EnergyBlock`]s, and
+//! [`QuadraticConstraints`] from coefficient triplets. [`solve`] minimises it by Levenberg-Marquardt or undamped guided projection
 //! ([`Options`]); the [`Report`] names the energy of every term at every iteration. Patterns,
 //! ordering and scatter are planned once per topology; the normal equations go to
 //! [`BandCholesky`] or [`SparseCholesky`], whichever the structure makes cheaper. Results do not
@@ -37,6 +37,7 @@
 //! ```
 
 mod check;
+mod closeness;
 mod damping;
 mod error;
 mod lbfgs;
@@ -51,6 +52,7 @@ mod quadratic;
 mod report;
 
 pub use check::{DerivativeCheck, check_gradient, check_jacobian};
+pub use closeness::Closeness;
 pub use damping::DampingRule;
 pub use error::SolverError;
 pub use lbfgs::{Euclidean, LbfgsIteration, LbfgsOptions, LbfgsReport, Metric, Objective, lbfgs};

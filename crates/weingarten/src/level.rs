@@ -5,11 +5,12 @@ use std::sync::Arc;
 
 use bspline::BsplineSurface;
 use geom_core::FirstForm;
-use gp_solver::{DampingRule, Iteration, Options, Problem, Report, System, solve_system};
+use gp_solver::{
+    Closeness, DampingRule, Iteration, Options, Problem, Report, System, solve_system,
+};
 
 use crate::blocks::{
-    Alignment, BorderGlide, Closeness, Fairness, LastIterate, Net, Parallel, RelationRows, Shape,
-    border_points,
+    Alignment, BorderGlide, Fairness, Net, Parallel, RelationRows, Shape, border_points,
 };
 use crate::error::WeingartenError;
 use crate::field::{Sample, samples};
@@ -96,7 +97,11 @@ impl Level {
             }
         }
         if w.closeness > 0.0 {
-            problem.add(Closeness::new(reference.clone(), w.closeness));
+            problem.add(Closeness::new(
+                "closeness",
+                reference.clone(),
+                vec![w.closeness; reference.len()],
+            ));
         }
         if w.fairness > 0.0 {
             problem.add(Fairness::new(net, Some(&reference), w.fairness));
@@ -105,7 +110,7 @@ impl Level {
             problem.add(Shape::new(net, &reference, w.shape));
         }
         add_border(&mut problem, options.border, &self.reference, &reference)?;
-        problem.add(LastIterate::new(x, LAST_ITERATE_WEIGHT));
+        problem.add(Closeness::to_last_iterate(x, LAST_ITERATE_WEIGHT));
         problem.set_order(order(
             net,
             self.reference.degree_u().get(),

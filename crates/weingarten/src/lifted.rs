@@ -13,12 +13,12 @@ use std::ops::ControlFlow;
 use std::sync::Arc;
 
 use gp_solver::{
-    Elements, Iteration, Options, Problem, QuadraticBuilder, QuadraticConstraints, Report,
-    ResidualBlock, solve_observed,
+    Closeness, Elements, Iteration, Options, Problem, QuadraticBuilder, QuadraticConstraints,
+    Report, ResidualBlock, solve_observed,
 };
 use rayon::prelude::*;
 
-use crate::blocks::{Closeness, Fairness, Shape};
+use crate::blocks::{Fairness, Shape};
 use crate::error::WeingartenError;
 use crate::grid::{LaneKernel, SampleGrid, Scratch, split_runs, store};
 use crate::kernel::SECOND;
@@ -108,7 +108,11 @@ pub(crate) fn problem(
     problem.add(Definitions::new(grid, x));
     problem.add(curvature_definitions(grid));
     if w.closeness > 0.0 {
-        problem.add(Closeness::new(reference.clone(), w.closeness));
+        problem.add(Closeness::new(
+            "closeness",
+            reference.clone(),
+            vec![w.closeness; reference.len()],
+        ));
     }
     if w.fairness > 0.0 {
         problem.add(Fairness::new(net, None, w.fairness));

@@ -4,11 +4,9 @@ use std::sync::Arc;
 
 use bspline::{BsplineSurface, KnotVector};
 use geom_core::assert_close;
-use gp_solver::{Factorization, ResidualBlock, System};
+use gp_solver::{Closeness, Factorization, ResidualBlock, System};
 
-use crate::blocks::{
-    Alignment, BorderGlide, Fairness, LastIterate, Net, Parallel, RelationRows, Shape,
-};
+use crate::blocks::{Alignment, BorderGlide, Fairness, Net, Parallel, RelationRows, Shape};
 use crate::field::samples;
 use crate::grid::SampleGrid;
 use crate::kernel::Field;
@@ -166,7 +164,7 @@ fn jacobians_of_net_terms_match_central_differences() {
             x.iter().enumerate().map(|(k, v)| v + 0.03 * (k as f64).sin()).collect();
         check_jacobian(&Fairness::new(net, Some(&x), 0.2), &moved, 1e-3, 1e-10);
         check_jacobian(&Shape::new(net, &x, 0.2), &moved, 1e-4, 1e-8);
-        check_jacobian(&LastIterate::new(&x, 0.2), &moved, 1e-3, 1e-10);
+        check_jacobian(&Closeness::to_last_iterate(&x, 0.2), &moved, 1e-3, 1e-10);
         let mut border = BorderGlide::new(net, &x, 1.0);
         border.refresh(&moved);
         check_jacobian(&border, &moved, 1e-3, 1e-10);

@@ -11,6 +11,6 @@ pub(crate) use alignment::Alignment;
 #[cfg(test)]
 pub(crate) use alignment::residual_scale;
 pub(crate) use border::{BorderGlide, border_points};
-pub(crate) use net::{Closeness, Fairness, LastIterate, Net, Shape};
+pub(crate) use net::{Fairness, Net, Shape};
 pub(crate) use parallel::Parallel;
 pub(crate) use relation::RelationRows;

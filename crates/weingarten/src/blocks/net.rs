@@ -1,4 +1,4 @@
-//! Terms on the control net: closeness, fairness, shape preservation, distance to the last iterate.
+//! Terms on the control net: fairness and shape preservation.
 
 use gp_solver::{Elements, ResidualBlock};
 
@@ -56,94 +56,6 @@ impl Net {
             }
         }
         edges
-    }
-}
-
-/// `w (c − c⁰)` for every coordinate of every control point.
-pub(crate) struct Closeness {
-    elements: Elements,
-    reference: Vec<f64>,
-    weight: f64,
-}
-
-impl Closeness {
-    pub(crate) fn new(reference: Vec<f64>, weight: f64) -> Self {
-        Self { elements: diagonal(reference.len()), reference, weight }
-    }
-}
-
-fn diagonal(unknowns: usize) -> Elements {
-    let mut elements = Elements::new();
-    for k in 0..unknowns {
-        elements.push(&[k], 1);
-    }
-    elements
-}
-
-impl ResidualBlock for Closeness {
-    fn name(&self) -> &str {
-        "closeness"
-    }
-
-    fn elements(&self) -> &Elements {
-        &self.elements
-    }
-
-    fn residuals(&self, x: &[f64], residuals: &mut [f64]) {
-        for (r, (x, x0)) in residuals.iter_mut().zip(x.iter().zip(&self.reference)) {
-            *r = self.weight * (x - x0);
-        }
-    }
-
-    fn linearize(&self, x: &[f64], residuals: &mut [f64], jacobian: &mut [f64]) {
-        self.residuals(x, residuals);
-        jacobian.fill(self.weight);
-    }
-
-    fn is_linear(&self) -> bool {
-        true
-    }
-}
-
-/// `ε (x − xᵏ)` with the last iterate `xᵏ` (Pellis et al. 2021, Eq. 11).
-pub(crate) struct LastIterate {
-    elements: Elements,
-    last: Vec<f64>,
-    weight: f64,
-}
-
-impl LastIterate {
-    pub(crate) fn new(x: &[f64], weight: f64) -> Self {
-        Self { elements: diagonal(x.len()), last: x.to_vec(), weight }
-    }
-}
-
-impl ResidualBlock for LastIterate {
-    fn name(&self) -> &str {
-        "last_iterate"
-    }
-
-    fn elements(&self) -> &Elements {
-        &self.elements
-    }
-
-    fn refresh(&mut self, x: &[f64]) {
-        self.last.copy_from_slice(x);
-    }
-
-    fn residuals(&self, x: &[f64], residuals: &mut [f64]) {
-        for (r, (x, x0)) in residuals.iter_mut().zip(x.iter().zip(&self.last)) {
-            *r = self.weight * (x - x0);
-        }
-    }
-
-    fn linearize(&self, x: &[f64], residuals: &mut [f64], jacobian: &mut [f64]) {
-        self.residuals(x, residuals);
-        jacobian.fill(self.weight);
-    }
-
-    fn is_linear(&self) -> bool {
-        true
     }
 }
 
