@@ -140,11 +140,11 @@ impl<S: Simd> Shape<S> {
     #[inline(always)]
     pub(crate) fn new(d: &Derivatives<S>) -> Self {
         let normal = cross(&d[0], &d[1]);
-        let area = dot(&normal, &normal).sqrt();
+        // Divided by the squares, which does not have to wait for the roots.
         let (e, f) = (dot(&d[0], &d[0]), dot(&d[0], &d[1]));
-        let length = e.sqrt();
-        let inv_area = area.recip();
-        let al = length.recip();
+        let square = dot(&normal, &normal);
+        let (area, length) = (square.sqrt(), e.sqrt());
+        let (inv_area, al) = (area * square.recip(), length * e.recip());
         let ga = length * inv_area;
         let be = -(f * al * inv_area);
         let products = [al * al, al * be, al * ga, be * be, be * ga * 2.0, ga * ga];
