@@ -3,7 +3,7 @@
 use crate::constraints::{LinearRow, Pull};
 use crate::evaluator::{SurfaceEnergy, Workspace};
 use crate::freedom::Freedom;
-use crate::functional::{Coefficients, Energy, ROOT_EPSILON};
+use crate::functional::{Energy, ROOT_EPSILON};
 use crate::metric::{MetricAssembly, Mixture};
 use gp_solver::{LbfgsOptions, Metric, SolverError, Status, lbfgs};
 use std::ops::ControlFlow;
@@ -196,11 +196,12 @@ impl Level<'_> {
     ///
     /// Energies of second order do not feel how the surface is parametrised, and their minimisers
     /// let rows of vertices run into one another between the quadrature points; so does the
-    /// gradient of mean curvature, `F1`, next to clamped rows where the curvature would jump.
-    /// With `F3` the jumps of the splines' third derivatives hold the rows apart.
+    /// gradient of mean curvature, `F1`, next to clamped rows where the curvature would jump, and
+    /// `∫√(F1² + F3²)`, for which a jump has a price but rows that gather there have none. With the
+    /// square of `F3` the jumps of the splines' third derivatives hold the rows apart.
     fn set_barrier(&mut self) {
-        let Coefficients { plain, scaled, .. } = self.energy.coefficients();
-        if plain.root != 0.0 || scaled.f3 != 0.0 || scaled.coupling != 0.0 {
+        let scaled = self.energy.coefficients().scaled;
+        if scaled.f3 != 0.0 || scaled.coupling != 0.0 {
             return;
         }
         let area = self.area();
