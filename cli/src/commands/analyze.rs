@@ -1,6 +1,7 @@
 //! `umbilic analyze INPUT`.
 
 use crate::args::ReportArgs;
+use crate::commands::fair::BlendRings;
 use crate::context::Context;
 use crate::failure::Failure;
 use crate::outcome::{Outcome, Status};
@@ -26,6 +27,10 @@ pub(crate) struct Analyze {
     /// Also the edge-based bending energy of the faces themselves, to compare with the surface's
     #[arg(long)]
     discrete_bending: bool,
+    /// Rings of patches the smooth blends at extraordinary vertices cover, as in fair
+    /// [default: auto]
+    #[arg(long, value_name = "N|auto")]
+    blend_rings: Option<BlendRings>,
     #[command(flatten)]
     report: ReportArgs,
 }
@@ -35,7 +40,9 @@ impl Analyze {
         self.report.check()?;
         let model =
             exchange::read_model(&self.input).map_err(|e| Failure::input(&self.input, e))?;
-        let Measured { kind, statistics, subdivision, warnings } = measure(&self.input, &model)?;
+        let rings = self.blend_rings.and_then(|rings| rings.0);
+        let Measured { kind, statistics, subdivision, warnings } =
+            measure(&self.input, &model, rings)?;
         let mut metrics = AnalyzeMetrics::new(kind, &statistics);
         metrics.subdivision = subdivision;
         if self.discrete_bending {
@@ -71,7 +78,7 @@ struct Measured {
     warnings: Vec<String>,
 }
 
-fn measure(path: &Path, model: &Model) -> Result<Measured, Failure> {
+fn measure(path: &Path, model: &Model, rings: Option<usize>) -> Result<Measured, Failure> {
     let mut statistics = CurvatureStatistics::default();
     let (mut subdivision, mut warnings) = (None, Vec::new());
     if !model.surfaces.is_empty() {
@@ -88,7 +95,7 @@ fn measure(path: &Path, model: &Model) -> Result<Measured, Failure> {
         && corners(4)
     {
         let mesh = mesh.to_poly_mesh().map_err(|e| Failure::input(path, e))?;
-        match curvature_variation::analyze(&mesh, Blend::Smooth) {
+        match curvature_variation::analyze(&mesh, Blend::Smooth, rings) {
             Ok(found) => {
                 subdivision = Some(SubdivisionMetrics::new(&found));
                 let statistics = found.statistics;

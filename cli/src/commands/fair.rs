@@ -63,6 +63,10 @@ struct Settings {
     /// [default: smooth]
     #[arg(long, value_enum)]
     blend: Option<BlendName>,
+    /// Rings of patches a smooth blend covers where there is room: a number, or auto for more of
+    /// them on finer meshes [default: auto]
+    #[arg(long, value_name = "N|auto")]
+    blend_rings: Option<BlendRings>,
     /// Keep the boundary and the two rings next to it
     #[arg(long, num_args = 0, default_missing_value = "true")]
     clamp_boundary: Option<bool>,
@@ -86,6 +90,7 @@ layered!(Settings {
     iterations,
     method,
     blend,
+    blend_rings,
     clamp_boundary,
     fix,
     family,
@@ -107,6 +112,42 @@ enum MethodName {
 enum BlendName {
     Smooth,
     Flat,
+}
+
+/// Rings of a blend.
+#[derive(Clone, Copy, Debug, Deserialize)]
+#[serde(try_from = "RingsValue")]
+pub(crate) struct BlendRings(pub(crate) Option<usize>);
+
+/// The same in a configuration file, where it may be a number.
+#[derive(Debug, Deserialize)]
+#[serde(untagged)]
+enum RingsValue {
+    Number(usize),
+    Text(String),
+}
+
+impl TryFrom<RingsValue> for BlendRings {
+    type Error = String;
+
+    fn try_from(value: RingsValue) -> Result<Self, String> {
+        match value {
+            RingsValue::Number(n) => n.to_string().parse(),
+            RingsValue::Text(text) => text.parse(),
+        }
+    }
+}
+
+impl std::str::FromStr for BlendRings {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        match text.parse() {
+            _ if text == "auto" => Ok(Self(None)),
+            Ok(rings) if rings > 0 => Ok(Self(Some(rings))),
+            _ => Err(format!("`{text}` is no number of rings; give a number from 1 up, or auto")),
+        }
+    }
 }
 
 impl Fair {
@@ -231,6 +272,7 @@ impl Settings {
                 BlendName::Smooth => Blend::Smooth,
                 BlendName::Flat => Blend::Flat,
             }),
+            blend_rings: self.blend_rings.and_then(|rings| rings.0),
             quadrature: Quadrature::NORMAL,
             symmetry,
             ..defaults
@@ -286,6 +328,8 @@ struct MetricsObject {
     torus_fit_rms: Option<f64>,
     vertices: usize,
     patches: usize,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    blend_rings: Option<[usize; 2]>,
     ms_per_gradient: f64,
     peak_memory_mb: Option<f64>,
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -310,6 +354,7 @@ impl MetricsObject {
             gradient_norm: result.report.gradient_norm,
             vertices: result.mesh.vertex_count(),
             patches: result.mesh.face_count(),
+            blend_rings: result.surface.blend_rings(),
             ms_per_gradient: 1e3 * result.report.seconds_per_gradient,
             peak_memory_mb: peak_memory_mb(),
             fitted_patches: splines.map(|s| s.fitted),

@@ -40,6 +40,7 @@ fn main() -> Result<(), Box<dyn Error>> {
             _ => Method::LaggedGaussNewton,
         },
         iterations: argument(7, "400").parse()?,
+        blend_rings: argument(9, "auto").parse().ok(),
         ..FairOptions::default()
     };
     let begin = std::time::Instant::now();

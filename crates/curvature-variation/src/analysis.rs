@@ -46,6 +46,8 @@ impl EnergyTable {
 
 /// Measures the Catmull-Clark limit surface of a mesh of quads or n-gons.
 ///
+/// `blend_rings` is as in [`SubdivisionSurface::with_rings`].
+///
 /// Curvatures are sampled at 6×6 Gauss points and the corners of every patch, so that extremes are
 /// those of the samples.
 ///
@@ -56,7 +58,7 @@ impl EnergyTable {
 /// ```
 /// use curvature_variation::{Functional, analyze};
 /// let mesh = fixtures::quad_graphs::torus(64, 64, 1.0, 0.5);
-/// let found = analyze(&mesh, subdiv_catmull_clark::Blend::Smooth)?;
+/// let found = analyze(&mesh, subdiv_catmull_clark::Blend::Smooth, None)?;
 /// // π² / (ρ √(1 − ρ²)) for the ratio ρ of the radii.
 /// let willmore = std::f64::consts::PI.powi(2) / (0.5 * 0.75_f64.sqrt());
 /// assert!((found.energies.get(Functional::Willmore) / willmore - 1.0).abs() < 1e-4);
@@ -64,7 +66,11 @@ impl EnergyTable {
 /// assert!((range.min + 4.0).abs() < 0.02 && (range.max - 4.0 / 3.0).abs() < 0.02, "{range:?}");
 /// # Ok::<(), subdiv_catmull_clark::SubdivisionError>(())
 /// ```
-pub fn analyze(mesh: &PolyMesh, blend: Blend) -> Result<SurfaceAnalysis, SubdivisionError> {
+pub fn analyze(
+    mesh: &PolyMesh,
+    blend: Blend,
+    blend_rings: Option<usize>,
+) -> Result<SurfaceAnalysis, SubdivisionError> {
     let mut mesh = mesh.clone();
     for _ in 0..refinements_needed(&mesh, &Creases::none()) {
         // Fails for meshes too large to count only, which the caller's mesh already passed.
@@ -73,7 +79,7 @@ pub fn analyze(mesh: &PolyMesh, blend: Blend) -> Result<SurfaceAnalysis, Subdivi
             Err(_) => break,
         }
     }
-    let surface = SubdivisionSurface::new(&mesh, &Creases::none(), blend)?;
+    let surface = SubdivisionSurface::with_rings(&mesh, &Creases::none(), blend, blend_rings)?;
     let free = Constraints::default();
     let fine = energies(&mesh, &surface, &free, Quadrature::FINE);
     let normal = energies(&mesh, &surface, &free, Quadrature::NORMAL);
@@ -109,11 +115,12 @@ fn statistics(mesh: &PolyMesh, surface: &SubdivisionSurface) -> CurvatureStatist
         parameters.extend(rule.iter().map(|&(v, wv)| (u, v, wu * wv)));
     }
     parameters.extend([(0.0, 0.0, 0.0), (1.0, 0.0, 0.0), (1.0, 1.0, 0.0), (0.0, 1.0, 0.0)]);
+    let positions = surface.control_points(mesh.positions());
     let parts: Vec<CurvatureStatistics> = surface
         .patches()
         .par_iter()
         .with_min_len(16)
-        .map(|patch| patch_statistics(mesh, surface, patch, &parameters))
+        .map(|patch| patch_statistics(&positions, surface, patch, &parameters))
         .collect();
     let mut all = CurvatureStatistics::default();
     parts.iter().for_each(|part| all.merge(part));
@@ -121,14 +128,14 @@ fn statistics(mesh: &PolyMesh, surface: &SubdivisionSurface) -> CurvatureStatist
 }
 
 fn patch_statistics(
-    mesh: &PolyMesh,
+    positions: &[DVec3],
     surface: &SubdivisionSurface,
     patch: &Patch,
     parameters: &[(f64, f64, f64)],
 ) -> CurvatureStatistics {
     let mut out = CurvatureStatistics::default();
     for &(u, v, weight) in parameters {
-        let jet = jet_at(mesh, surface, patch, u, v);
+        let jet = jet_at(positions, surface, patch, u, v);
         let first = jet.first_form();
         let area = weight * (first.e * first.g - first.f * first.f).max(0.0).sqrt();
         out.add_area(area);

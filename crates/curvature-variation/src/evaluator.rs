@@ -2,10 +2,12 @@
 
 use crate::density::Density;
 use crate::functional::{Coefficients, Energy, Functional};
+use crate::guides::Guides;
 use crate::kernel::{GRADIENT_LEN, PatchRun, Task};
 use crate::rules::{Quadrature, SeparableRule, Table};
 use pulp::Arch;
 use rayon::prelude::*;
+use std::sync::Arc;
 use subdiv_catmull_clark::{BasisId, SubdivisionSurface};
 
 /// Patches a worker takes at a time, so that sums do not depend on how the work was divided.
@@ -13,7 +15,8 @@ const RUN: usize = 16;
 
 pub(crate) enum Rule {
     Separable(SeparableRule),
-    Table(Table),
+    /// Shared by the groups of one basis.
+    Table(Arc<Table>),
 }
 
 /// Patches with one basis and one multiplicity.
@@ -49,6 +52,7 @@ impl Group {
 pub struct SurfaceEnergy {
     arch: Arch,
     groups: Vec<Group>,
+    guides: Guides,
     vertex_count: usize,
     patch_count: usize,
     slot_count: usize,
@@ -65,6 +69,8 @@ pub struct SurfaceEnergy {
 pub struct Workspace {
     integrals: Vec<[f64; 2]>,
     gradients: Vec<f64>,
+    // Vertices and coefficients of guides.
+    points: Vec<f64>,
 }
 
 /// Values of all functionals on one surface.
@@ -124,24 +130,20 @@ impl SurfaceEnergy {
         keys.sort_by_key(|&(basis, multiplicity)| {
             (surface.regular_basis() == Some(basis), basis, multiplicity)
         });
-        let mut tables: Vec<(BasisId, Table)> = keys
+        let mut tables: Vec<(BasisId, Arc<Table>)> = keys
             .iter()
             .map(|k| k.0)
             .filter(|&b| surface.regular_basis() != Some(b))
             .collect::<std::collections::BTreeSet<_>>()
             .into_par_iter()
-            .map(|b| {
-                let nodes = if surface.is_blended(b) || surface.b_spline_grid(b).is_none() {
-                    quadrature.extraordinary
-                } else {
-                    quadrature.regular
-                };
-                (b, Table::new(surface, b, nodes))
-            })
+            .map(|b| (b, Arc::new(Table::new(surface, b, quadrature.nodes(surface, b)))))
             .collect();
         tables.sort_by_key(|t| t.0);
+        let evaluated = (0..surface.patches().len()).filter(|&i| key(i).1 > 0);
+        let controls = evaluated.flat_map(|i| surface.patches()[i].controls.iter().copied());
         let mut this = Self {
             arch: Arch::new(),
+            guides: Guides::new(surface, controls),
             groups: Vec::with_capacity(keys.len()),
             vertex_count,
             patch_count: 0,
@@ -155,11 +157,11 @@ impl SurfaceEnergy {
             let rule = if surface.regular_basis() == Some(basis) {
                 match SeparableRule::new(surface, basis, quadrature.regular) {
                     Some(rule) => Rule::Separable(rule),
-                    None => Rule::Table(Table::new(surface, basis, quadrature.regular)),
+                    None => Rule::Table(Arc::new(Table::new(surface, basis, quadrature.regular))),
                 }
             } else {
                 let at = tables.partition_point(|t| t.0 < basis);
-                Rule::Table(tables[at].1.clone())
+                Rule::Table(Arc::clone(&tables[at].1))
             };
             let mut controls = Vec::new();
             for (i, patch) in surface.patches().iter().enumerate() {
@@ -194,7 +196,8 @@ impl SurfaceEnergy {
         let mut vertices: Vec<u32> = Vec::new();
         let mut factors: Vec<f64> = Vec::new();
         // Slot of a vertex in the run that met it last, and that run's first slot.
-        let mut met = vec![(u32::MAX, 0_u16); self.vertex_count];
+        let points = self.vertex_count + self.guides.len();
+        let mut met = vec![(u32::MAX, 0_u16); points];
         for group in &mut self.groups {
             for controls in group.controls.chunks(group.run * group.per_patch) {
                 let first = vertices.len() as u32;
@@ -211,11 +214,11 @@ impl SurfaceEnergy {
             }
             group.run_starts.push(vertices.len() as u32);
         }
-        let mut starts = vec![0_u32; self.vertex_count + 1];
+        let mut starts = vec![0_u32; points + 1];
         for &v in &vertices {
             starts[v as usize + 1] += 1;
         }
-        for v in 0..self.vertex_count {
+        for v in 0..points {
             starts[v + 1] += starts[v];
         }
         let mut next = starts.clone();
@@ -252,6 +255,10 @@ impl SurfaceEnergy {
 
     pub(crate) fn groups(&self) -> &[Group] {
         &self.groups
+    }
+
+    pub(crate) fn guides(&self) -> &Guides {
+        &self.guides
     }
 
     pub(crate) fn arch(&self) -> Arch {
@@ -378,6 +385,18 @@ impl SurfaceEnergy {
     /// the workspace.
     fn pass(&self, positions: &[f64], task: Task<'_>, work: &mut Workspace) -> [f64; 2] {
         assert_eq!(positions.len(), 3 * self.vertex_count, "three coordinates per vertex");
+        if self.guides.is_empty() {
+            return self.pass_over(positions, task, work);
+        }
+        let mut points = std::mem::take(&mut work.points);
+        self.guides.extend(positions, &mut points);
+        let sums = self.pass_over(&points, task, work);
+        work.points = points;
+        sums
+    }
+
+    /// As [`Self::pass`], of all control points.
+    fn pass_over(&self, positions: &[f64], task: Task<'_>, work: &mut Workspace) -> [f64; 2] {
         let with_gradient = matches!(task, Task::Gradient(_));
         work.integrals.resize(self.patch_count, [0.0; 2]);
         if with_gradient {
@@ -417,7 +436,7 @@ impl SurfaceEnergy {
                     gradients,
                 }),
                 Rule::Table(rule) => arch.dispatch(PatchRun {
-                    rule,
+                    rule: &**rule,
                     task,
                     positions,
                     controls,
@@ -441,7 +460,7 @@ impl SurfaceEnergy {
 
     /// `out = f · ∂∫ + g · ∂A` from the last gradient pass.
     fn gather(&self, work: &Workspace, f: f64, g: f64, out: &mut [f64]) {
-        out.par_chunks_mut(3).with_min_len(256).enumerate().for_each(|(v, out)| {
+        let collect = |v: usize| {
             let mut sum = [0.0; 3];
             for &slot in &self.slots[self.starts[v] as usize..self.starts[v + 1] as usize] {
                 let at = GRADIENT_LEN * slot as usize;
@@ -451,8 +470,12 @@ impl SurfaceEnergy {
                         factor * (f * work.gradients[at + c] + g * work.gradients[at + 3 + c]);
                 }
             }
-            out.copy_from_slice(&sum);
+            sum
+        };
+        out.par_chunks_mut(3).with_min_len(256).enumerate().for_each(|(v, out)| {
+            out.copy_from_slice(&collect(v));
         });
+        self.guides.pull_back(collect, out);
     }
 }
 

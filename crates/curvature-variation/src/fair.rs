@@ -47,6 +47,9 @@ pub struct FairOptions {
     pub method: Method,
     /// How extraordinary vertices are repaired.
     pub blend: Blend,
+    /// Rings of patches a smooth blend covers, where there is room; `None` for as many as
+    /// [`SubdivisionSurface::with_rings`] finds best.
+    pub blend_rings: Option<usize>,
     /// Gauss points while minimising.
     pub quadrature: Quadrature,
     /// A level has converged when a round of 40 steps (or 20 of them in a row) lowers the energy by
@@ -64,10 +67,22 @@ impl Default for FairOptions {
             iterations: 2000,
             method: Method::default(),
             blend: Blend::default(),
+            blend_rings: None,
             quadrature: Quadrature::NORMAL,
             tolerance: 1e-5,
             symmetry: SymmetryMode::default(),
         }
+    }
+}
+
+impl FairOptions {
+    /// The surface of a mesh with the blends these options ask for.
+    pub(crate) fn surface_of(
+        &self,
+        mesh: &PolyMesh,
+        creases: &Creases,
+    ) -> Result<SubdivisionSurface, SubdivisionError> {
+        SubdivisionSurface::with_rings(mesh, creases, self.blend, self.blend_rings)
     }
 }
 
@@ -264,7 +279,7 @@ pub fn fair(
         return Err(FairError::TooManyLevels { levels, vertices, limit });
     }
     let initial = mesh.clone();
-    let initial_surface = SubdivisionSurface::new(&initial, &creases, options.blend)?;
+    let initial_surface = options.surface_of(&initial, &creases)?;
     let before = energies(&initial, &initial_surface, constraints, options.quadrature);
     let area = before.get(Functional::Area);
     let places = pulled_places(constraints, &initial, &initial_surface, area);
@@ -305,7 +320,7 @@ pub fn fair(
         gradient_norm = norm;
         levels.push(report);
     }
-    let surface = SubdivisionSurface::new(&mesh, &creases, options.blend)?;
+    let surface = options.surface_of(&mesh, &creases)?;
     let mut report = finished(&mesh, &surface, constraints, options, before, levels, gradient_norm);
     let sharp = |h| creases.sharpness(mesh.origin(h), mesh.target(h)) == INFINITE_SHARPNESS;
     if mesh.edges().any(sharp) {
@@ -418,7 +433,7 @@ fn minimise_level(
     if fixed.iter().all(|&f| f) {
         return Err(FairError::NothingFree { vertices: mesh.vertex_count() });
     }
-    let surface = SubdivisionSurface::new(mesh, creases, options.blend)?;
+    let surface = options.surface_of(mesh, creases)?;
     let pinned = constraints.concern_limits();
     // Conditions on the limit surface are not checked for symmetry, so they switch it off.
     let group = match &options.symmetry {

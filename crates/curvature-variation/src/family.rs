@@ -11,7 +11,7 @@ use geom_core::PolyMesh;
 use gp_solver::{Euclidean, LbfgsOptions, lbfgs};
 use std::ops::ControlFlow;
 use std::time::Instant;
-use subdiv_catmull_clark::{Creases, SubdivisionSurface, refine, refinements_needed};
+use subdiv_catmull_clark::{Creases, refine, refinements_needed};
 
 /// Converged once 3 steps together lower the energy by at most this share, or the gradient has
 /// fallen to the second; with a handful of unknowns that is a matter of a dozen steps.
@@ -54,7 +54,7 @@ pub fn fair_in_family(
         })
         .collect::<Result<_, FairError>>()?;
     let creases = Creases::none();
-    let surface = SubdivisionSurface::new(&mesh, &creases, options.blend)?;
+    let surface = options.surface_of(&mesh, &creases)?;
     let evaluator = SurfaceEnergy::new(&surface, mesh.vertex_count(), options.quadrature);
     let mut objective = FamilyEnergy {
         evaluator: &evaluator,

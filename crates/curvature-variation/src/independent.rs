@@ -14,7 +14,7 @@ use geom_core::{DVec3, PolyMesh};
 use num_dual::{Dual64, DualNum};
 use std::collections::HashMap;
 use subdiv_catmull_clark::{
-    BasisId, Blend, Creases, JetWeights, SubdivisionSurface, limit_masks, refine,
+    BasisId, Blend, Creases, GuideSector, JetWeights, SubdivisionSurface, limit_masks, refine,
 };
 
 type Vector = [Dual64; 3];
@@ -274,6 +274,15 @@ impl Case {
         regular: usize,
         other: usize,
     ) -> Vec<(f64, Sample)> {
+        let mut x = x.to_vec();
+        for sector in self.surface.sectors() {
+            for k in 0..GuideSector::COEFFICIENTS {
+                for c in 0..3 {
+                    let vertices = sector.vertices.iter().zip(sector.weights(k));
+                    x.push(vertices.map(|(&v, &w)| x[3 * v as usize + c] * w).sum());
+                }
+            }
+        }
         let mut tables: HashMap<BasisId, Vec<(f64, JetWeights)>> = HashMap::new();
         let mut samples = Vec::new();
         for (patch, &count) in self.surface.patches().iter().zip(multiplicities) {
@@ -281,8 +290,10 @@ impl Case {
                 continue;
             }
             let table = tables.entry(patch.basis).or_insert_with(|| {
-                let plain = self.surface.b_spline_grid(patch.basis).is_some();
-                let rule = if plain { gauss_legendre(regular) } else { quartered(other) };
+                let quadrature = Quadrature { regular, extraordinary: other };
+                let nodes = quadrature.nodes(&self.surface, patch.basis);
+                let plain = self.surface.is_smooth(patch.basis);
+                let rule = if plain { gauss_legendre(nodes) } else { quartered(nodes) };
                 let product = |&(u, a): &(f64, f64)| {
                     let at =
                         |&(v, b): &(f64, f64)| (a * b, self.surface.weights(patch.basis, u, v));
@@ -291,7 +302,7 @@ impl Case {
                 rule.iter().flat_map(product).collect()
             });
             for (weight, jet) in table.iter() {
-                samples.push((f64::from(count) * weight, Sample::new(jet, &patch.controls, x)));
+                samples.push((f64::from(count) * weight, Sample::new(jet, &patch.controls, &x)));
             }
         }
         samples

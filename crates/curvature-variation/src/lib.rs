@@ -32,6 +32,8 @@ mod fair;
 mod family;
 mod freedom;
 mod functional;
+mod guide_block;
+mod guides;
 #[cfg(test)]
 mod independent;
 mod kernel;

@@ -2,8 +2,9 @@
 
 use crate::constraints::Pull;
 use crate::density::{Density, FrameAdjoint, Shape};
-use crate::evaluator::{Group, SurfaceEnergy};
+use crate::evaluator::SurfaceEnergy;
 use crate::freedom::Freedom;
+use crate::guide_block::{GuideBlock, is_guided};
 use crate::kernel::{gather, table_adjoint, table_derivatives};
 use crate::lanes::{Lanes, align_frame};
 use crate::rules::{MAX_LANES, Table};
@@ -32,36 +33,14 @@ pub(crate) struct Mixture {
     pub(crate) sobolev: f64,
 }
 
-/// A basis at the nodes of the metrics, also with one row per sample and derivative.
-struct MetricRule {
-    table: Table,
-    /// `rows[(9 s + d) · width + k]`, the width rounded up to whole vectors.
-    rows: Vec<f64>,
-}
-
-impl MetricRule {
-    fn new(table: Table) -> Self {
-        let width = table.controls.next_multiple_of(MAX_LANES);
-        let mut rows = vec![0.0; 9 * table.samples * width];
-        for s in 0..table.samples {
-            let (start, step) = table.chunk(s, 1);
-            for d in 0..9 {
-                for k in 0..table.controls {
-                    rows[(9 * s + d) * width + k] =
-                        table.values[start + (d * table.controls + k) * step];
-                }
-            }
-        }
-        Self { table, rows }
-    }
-}
-
 /// A metric on the unknowns, with the structure of its matrix worked out once.
 ///
 /// The unknowns of a vertex form a block, and all columns of a block have the same rows, so that
 /// the structure is kept by blocks, in the order in which they are eliminated.
 pub(crate) struct MetricAssembly {
-    rules: Vec<MetricRule>,
+    // The bases at the nodes of the metrics.
+    rules: Vec<Table>,
+    blocks: Vec<GuideBlock>,
     cholesky: SparseCholesky,
     // Where every unknown comes in the order of elimination.
     place: Vec<u32>,
@@ -87,12 +66,14 @@ impl MetricAssembly {
             .groups()
             .par_iter()
             .map(|group| {
-                let bicubic = surface.b_spline_grid(group.basis).is_some();
-                let nodes = if bicubic { REGULAR_NODES } else { EXTRAORDINARY_NODES };
-                MetricRule::new(Table::new(surface, group.basis, nodes))
+                let smooth = surface.is_smooth(group.basis);
+                let nodes = if smooth { REGULAR_NODES } else { EXTRAORDINARY_NODES };
+                Table::new(surface, group.basis, nodes)
             })
             .collect();
-        let (pattern, place) = eliminated_pattern(evaluator.groups(), freedom, pulls)?;
+        let blocks = GuideBlock::all(evaluator);
+        let cliques = Cliques { evaluator, blocks: &blocks };
+        let (pattern, place) = eliminated_pattern(&cliques, freedom, pulls)?;
         let pulls = pull_entries(freedom, pulls)
             .into_iter()
             .map(|((i, j), value)| {
@@ -101,13 +82,13 @@ impl MetricAssembly {
             })
             .collect();
         let mut offsets = Vec::new();
-        for_pairs(evaluator.groups(), freedom, &place, |a, b| {
+        for_pairs(&cliques, freedom, &place, |a, b| {
             let slot = pattern.slot(a, b).unwrap_or(0);
             offsets.push((slot - pattern.column_starts()[b]) as u32);
         });
         offsets.shrink_to_fit();
         let cholesky = SparseCholesky::in_given_order(pattern)?;
-        Ok(Self { rules, cholesky, place, offsets, pulls })
+        Ok(Self { rules, blocks, cholesky, place, offsets, pulls })
     }
 
     /// Number of stored values of the factor.
@@ -160,7 +141,13 @@ impl MetricAssembly {
         let mut values = vec![0.0; self.cholesky.pattern().len()];
         let mut next_pair = 0;
         let mean_area = area / evaluator.weighted_patches();
+        let mut points = Vec::new();
+        evaluator.guides().extend(positions, &mut points);
+        let positions = &points[..];
         for (group, rule) in evaluator.groups().iter().zip(&self.rules) {
+            if is_guided(evaluator, group) {
+                continue;
+            }
             let width = element_width(group.per_patch);
             for controls in group.controls.chunks(BATCH * group.per_patch) {
                 let mut matrices = vec![0.0; controls.len() / group.per_patch * width * width];
@@ -192,6 +179,22 @@ impl MetricAssembly {
                     );
                 }
             }
+        }
+        for block in &self.blocks {
+            let matrix = block.matrix(evaluator, |group, controls, matrix| {
+                evaluator.arch().dispatch(ElementMatrix {
+                    rule: &self.rules[group],
+                    mixture,
+                    positions,
+                    controls,
+                    area,
+                    least_area: LEAST_AREA * mean_area,
+                    matrix,
+                });
+            });
+            let width = 3 * block.vertices.len();
+            next_pair =
+                self.scatter(&matrix, width, &block.vertices, 1.0, freedom, next_pair, &mut values);
         }
         for &(slot, value) in &self.pulls {
             values[slot as usize] += value;
@@ -265,7 +268,7 @@ impl MetricAssembly {
 
 /// Structure of the matrix with the unknowns in the order of elimination, and where each comes.
 fn eliminated_pattern(
-    groups: &[Group],
+    cliques: &Cliques<'_>,
     freedom: &Freedom,
     pulls: &[Pull],
 ) -> Result<(SymmetricPattern, Vec<u32>), SolverError> {
@@ -277,8 +280,7 @@ fn eliminated_pattern(
         met.dedup();
         met
     };
-    let patches = groups.iter().flat_map(|g| g.controls.chunks(g.per_patch));
-    let coupled = patches.map(|controls| clique(&mut controls.iter().copied()));
+    let coupled = cliques.iter().map(|controls| clique(&mut controls.iter().copied()));
     let pulled = pulls.iter().map(|p| clique(&mut p.stencil.iter().map(|&(v, _)| v)));
     let coarse = SymmetricPattern::from_cliques(blocks.len(), coupled.chain(pulled));
     let mut place = vec![0; freedom.len()];
@@ -308,7 +310,7 @@ fn eliminated_pattern(
 // Ordered pairs of control points that have unknowns, the first one's not eliminated before the
 // second one's: the places of their first unknowns.
 fn for_pairs(
-    groups: &[Group],
+    cliques: &Cliques<'_>,
     freedom: &Freedom,
     place: &[u32],
     mut visit: impl FnMut(usize, usize),
@@ -317,16 +319,30 @@ fn for_pairs(
         let v = v as usize;
         (freedom.dim[v] > 0).then(|| place[freedom.start[v] as usize] as usize)
     };
-    for group in groups {
-        for controls in group.controls.chunks(group.per_patch) {
-            for a in controls.iter().filter_map(|&a| first(a)) {
-                for b in controls.iter().filter_map(|&b| first(b)) {
-                    if a >= b {
-                        visit(a, b);
-                    }
+    for controls in cliques.iter() {
+        for a in controls.iter().filter_map(|&a| first(a)) {
+            for b in controls.iter().filter_map(|&b| first(b)) {
+                if a >= b {
+                    visit(a, b);
                 }
             }
         }
+    }
+}
+
+/// Sets of control points of which all depend on one another, in the order of assembly: those of
+/// the patches, then those of wide blends.
+struct Cliques<'a> {
+    evaluator: &'a SurfaceEnergy,
+    blocks: &'a [GuideBlock],
+}
+
+impl<'a> Cliques<'a> {
+    fn iter(&self) -> impl Iterator<Item = &'a [u32]> {
+        let evaluator = self.evaluator;
+        let groups = evaluator.groups().iter().filter(move |g| !is_guided(evaluator, g));
+        let patches = groups.flat_map(|g| g.controls.chunks(g.per_patch));
+        patches.chain(self.blocks.iter().map(|b| &b.vertices[..]))
     }
 }
 
@@ -349,13 +365,13 @@ fn pull_entries(freedom: &Freedom, pulls: &[Pull]) -> Vec<((usize, usize), f64)>
     out
 }
 
-fn element_width(per_patch: usize) -> usize {
+pub(crate) fn element_width(per_patch: usize) -> usize {
     (3 * per_patch).next_multiple_of(MAX_LANES)
 }
 
 /// The matrix of one patch, upper triangle, rows padded to whole vectors.
 struct ElementMatrix<'a> {
-    rule: &'a MetricRule,
+    rule: &'a Table,
     mixture: &'a Mixture,
     positions: &'a [f64],
     controls: &'a [u32],
@@ -372,7 +388,7 @@ impl WithSimd for ElementMatrix<'_> {
         align_frame();
         let count = self.controls.len();
         let width = element_width(count);
-        let table = &self.rule.table;
+        let table = self.rule;
         let (values, _) = S::as_simd_f64s(&table.values);
         let (weights, _) = S::as_simd_f64s(&table.weights);
         let mut points = vec![[0.0; 3]; count];
@@ -395,11 +411,14 @@ impl WithSimd for ElementMatrix<'_> {
                 for lane in 0..S::F64_LANES {
                     let j = area[lane].max(self.least_area);
                     mass += w[lane] * j;
-                    let sample = S::F64_LANES * chunk + lane;
-                    let length = 9 * scalar_width;
-                    let from = &self.rule.rows[sample * length..(sample + 1) * length];
-                    let to = &mut scalar_rows[lane * length..(lane + 1) * length];
-                    scale_rows(from, to, scalar_width, &self.sobolev_scales(w[lane], j));
+                    let (start, step) = table.chunk(S::F64_LANES * chunk + lane, 1);
+                    let to = &mut scalar_rows[lane * 9 * scalar_width..][..9 * scalar_width];
+                    let factors = self.sobolev_scales(w[lane], j);
+                    for (d, (row, factor)) in to.chunks_mut(scalar_width).zip(factors).enumerate() {
+                        for (k, value) in row[..count].iter_mut().enumerate() {
+                            *value = factor * table.values[start + (d * count + k) * step];
+                        }
+                    }
                 }
                 let rows = &scalar_rows[..S::F64_LANES * 9 * scalar_width];
                 add_outer_products(simd, rows, scalar_width, count, &mut scalar);
@@ -456,15 +475,6 @@ impl ElementMatrix<'_> {
         let [first, second, third] = [first.sqrt(), second.sqrt(), third.sqrt()];
         let (mixed, twice) = (2.0_f64.sqrt() * second, 3.0_f64.sqrt() * third);
         [first, first, second, mixed, second, third, twice, twice, third]
-    }
-}
-
-#[inline(always)]
-fn scale_rows(from: &[f64], to: &mut [f64], width: usize, factors: &[f64; 9]) {
-    for ((from, to), &factor) in from.chunks(width).zip(to.chunks_mut(width)).zip(factors) {
-        for (x, y) in from.iter().zip(to) {
-            *y = factor * x;
-        }
     }
 }
 

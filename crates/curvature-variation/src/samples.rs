@@ -46,10 +46,11 @@ impl SurfaceSamples {
     #[must_use]
     pub fn new(mesh: &PolyMesh, surface: &SubdivisionSurface, side: usize) -> Self {
         let side = side.max(2);
+        let positions = surface.control_points(mesh.positions());
         let patches: Vec<PatchSamples> = surface
             .patches()
             .par_iter()
-            .map(|patch| sample_patch(mesh, surface, patch, side))
+            .map(|patch| sample_patch(&positions, surface, patch, side))
             .collect();
         let mut out = Self::default();
         for patch in &patches {
@@ -64,7 +65,7 @@ impl SurfaceSamples {
             }
         }
         out.umbilics = directions.umbilics(surface.patches(), |patch, u, v| {
-            let jet = jet_at(mesh, surface, &surface.patches()[patch], u, v);
+            let jet = jet_at(&positions, surface, &surface.patches()[patch], u, v);
             Some((jet.position(), ThirdOrder::new(&jet).ok()?))
         });
         let length = 0.8 * mesh.mean_edge_length();
@@ -125,27 +126,27 @@ impl SurfaceSamples {
     }
 }
 
-/// The jet at a point of a patch, next to an extraordinary corner for the corner itself.
+/// The jet at a point of a patch from all control points, next to an extraordinary corner for the corner itself.
 pub(crate) fn jet_at(
-    mesh: &PolyMesh,
+    positions: &[DVec3],
     surface: &SubdivisionSurface,
     patch: &Patch,
     u: f64,
     v: f64,
 ) -> SurfaceJet {
-    let jet = surface.evaluate(mesh.positions(), patch, u, v);
-    let regular = surface.b_spline_grid(patch.basis).is_some();
+    let jet = surface.evaluate(positions, patch, u, v);
+    let regular = surface.is_smooth(patch.basis);
     let inner = |t: f64| t.clamp(CORNER, 1.0 - CORNER);
     if regular || (inner(u) == u || inner(v) == v) {
         return jet;
     }
-    let mut beside = surface.evaluate(mesh.positions(), patch, inner(u), inner(v));
+    let mut beside = surface.evaluate(positions, patch, inner(u), inner(v));
     beside.derivatives[0] = jet.position();
     beside
 }
 
 fn sample_patch(
-    mesh: &PolyMesh,
+    positions: &[DVec3],
     surface: &SubdivisionSurface,
     patch: &Patch,
     side: usize,
@@ -153,7 +154,7 @@ fn sample_patch(
     let at = |i: usize| i as f64 / (side - 1) as f64;
     let mut points = Vec::with_capacity(side * side);
     for k in 0..side * side {
-        let jet = jet_at(mesh, surface, patch, at(k / side), at(k % side));
+        let jet = jet_at(positions, surface, patch, at(k / side), at(k % side));
         let shape = ThirdOrder::new(&jet).ok();
         let principal =
             jet.second_form().and_then(|second| principal_curvatures(jet.first_form(), second));

@@ -1,6 +1,8 @@
 //! A subdivision surface as B-spline surfaces, for CAD.
 
-use bspline::{BsplineSurface, Degree, FitError, KnotError, KnotVector, SplineError, fit_surface};
+use bspline::{
+    BsplineSurface, Degree, FitError, KnotError, KnotVector, SplineError, fit_curve, fit_surface,
+};
 use geom_core::{DVec3, FaceId, PolyMesh};
 use rayon::prelude::*;
 use std::collections::BTreeMap;
@@ -13,6 +15,8 @@ const DEGREE: usize = 3;
 const OCTAVES: i32 = 8;
 /// Spans between a knot and the one at half its distance.
 const SPANS_PER_OCTAVE: u32 = 4;
+/// Spans of a fitted spline of a patch that is smooth everywhere.
+const SMOOTH_SPANS: usize = 8;
 /// Parameters per control point and direction at which the distance to the surface is taken.
 const CHECKS: usize = 2;
 
@@ -45,9 +49,12 @@ pub enum SplinePatchError {
 ///
 /// Bi-cubic patches are given exactly, as Bézier patches. A patch at an extraordinary vertex or a
 /// semi-sharp crease is no polynomial; it becomes a bi-cubic spline through the points at the
-/// Greville parameters of knots that crowd together towards the vertex, four spans to an octave. Two neighbours around the
-/// vertex interpolate the same points of their common edge with the same knots, and the outer
-/// edges are cubic, which interpolation reproduces; so there are no gaps between the surfaces.
+/// Greville parameters of knots that crowd together towards the vertex, four spans to an octave.
+/// The other patches of a blend of several rings are smooth, and eight equal spans do. Two
+/// neighbours interpolate the same points of their common edge with the same knots, but for those of
+/// a patch at the vertex which it shares with a smooth one: there it takes over the other's edge,
+/// whose knots are among its own. The outer edges of a blend are cubic, which interpolation
+/// reproduces; so there are no gaps between the surfaces.
 ///
 /// # Errors
 /// [`SplinePatchError`] if a control point is not finite.
@@ -63,6 +70,7 @@ pub fn spline_patches(
             rules.insert(patch.basis, FittedRule::new(surface, patch.basis)?);
         }
     }
+    let controls = surface.control_points(mesh.positions());
     let patches: Vec<(FaceId, BsplineSurface, Option<f64>)> = surface
         .patches()
         .par_iter()
@@ -74,7 +82,7 @@ pub fn spline_patches(
                 let exact = BsplineSurface::new(knots.clone(), knots, points, None)?;
                 return Ok((patch.face, exact, None));
             }
-            let control = |k: usize| positions[patch.controls[k] as usize];
+            let control = |k: usize| controls[patch.controls[k] as usize];
             let (fitted, deviation) = rules[&patch.basis].fit(&control)?;
             Ok((patch.face, fitted, Some(deviation)))
         })
@@ -94,22 +102,55 @@ struct FittedRule {
     checks: Vec<f64>,
     at_nodes: Vec<JetWeights>,
     at_checks: Vec<JetWeights>,
+    edges: Option<OuterEdges>,
+}
+
+/// The edges `u = 1` and `v = 1` of a patch at the vertex of a blend of several rings.
+struct OuterEdges {
+    knots: KnotVector,
+    nodes: Vec<f64>,
+    at_nodes: [Vec<JetWeights>; 2],
+}
+
+impl OuterEdges {
+    fn new(surface: &SubdivisionSurface, basis: BasisId) -> Result<Self, SplinePatchError> {
+        let knots = smooth_knots()?;
+        let nodes = knots.greville_points();
+        let at_nodes = [
+            nodes.iter().map(|&t| surface.weights(basis, 1.0, t)).collect(),
+            nodes.iter().map(|&t| surface.weights(basis, t, 1.0)).collect(),
+        ];
+        Ok(Self { knots, nodes, at_nodes })
+    }
+}
+
+fn smooth_knots() -> Result<KnotVector, KnotError> {
+    KnotVector::clamped_uniform(Degree::new(DEGREE)?, DEGREE + SMOOTH_SPANS)
 }
 
 impl FittedRule {
     fn new(surface: &SubdivisionSurface, basis: BasisId) -> Result<Self, SplinePatchError> {
-        let mut inner = graded_breaks();
-        if !surface.is_blended(basis) {
-            // Any corner of a patch at a crease can be extraordinary.
-            inner.retain(|&t| t <= 0.5);
-            let mirrored: Vec<f64> =
-                inner.iter().rev().filter(|&&t| t < 0.5).map(|t| 1.0 - t).collect();
-            inner.extend(mirrored);
-        }
-        let mut knots = vec![0.0; DEGREE + 1];
-        knots.extend(inner);
-        knots.extend([1.0; DEGREE + 1]);
-        let knots = KnotVector::new(Degree::new(DEGREE)?, knots)?;
+        let edges = if surface.is_wide(basis) && !surface.is_smooth(basis) {
+            Some(OuterEdges::new(surface, basis)?)
+        } else {
+            None
+        };
+        let knots = if surface.is_smooth(basis) {
+            smooth_knots()?
+        } else {
+            let mut inner = graded_breaks();
+            if !surface.is_blended(basis) {
+                // Any corner of a patch at a crease can be extraordinary.
+                inner.retain(|&t| t <= 0.5);
+                let mirrored: Vec<f64> =
+                    inner.iter().rev().filter(|&&t| t < 0.5).map(|t| 1.0 - t).collect();
+                inner.extend(mirrored);
+            }
+            let mut knots = vec![0.0; DEGREE + 1];
+            knots.extend(inner);
+            knots.extend([1.0; DEGREE + 1]);
+            KnotVector::new(Degree::new(DEGREE)?, knots)?
+        };
         let nodes = knots.greville_points();
         let checks = knots.uniform_parameters(CHECKS * knots.control_count());
         let weights = |t: &[f64]| -> Vec<JetWeights> {
@@ -118,14 +159,26 @@ impl FittedRule {
                 .collect()
         };
         let (at_nodes, at_checks) = (weights(&nodes), weights(&checks));
-        Ok(Self { knots, nodes, checks, at_nodes, at_checks })
+        Ok(Self { knots, nodes, checks, at_nodes, at_checks, edges })
     }
 
     fn fit(&self, control: &dyn Fn(usize) -> DVec3) -> Result<(BsplineSurface, f64), FitError> {
         let point = |weights: &JetWeights| -> DVec3 {
             weights.row(0).iter().enumerate().map(|(k, &w)| w * control(k)).sum()
         };
-        let points: Vec<DVec3> = self.at_nodes.iter().map(point).collect();
+        let mut points: Vec<DVec3> = self.at_nodes.iter().map(point).collect();
+        if let Some(edges) = &self.edges {
+            let count = self.nodes.len();
+            for (along_v, weights) in edges.at_nodes.iter().enumerate() {
+                let on_edge: Vec<DVec3> = weights.iter().map(point).collect();
+                let curve = fit_curve(&edges.knots, &edges.nodes, &on_edge)?;
+                for (k, &t) in self.nodes.iter().enumerate() {
+                    let place =
+                        if along_v == 0 { (count - 1) * count + k } else { k * count + count - 1 };
+                    points[place] = curve.point(t);
+                }
+            }
+        }
         let fitted = fit_surface(&self.knots, &self.knots, &self.nodes, &self.nodes, &points)?;
         let got = fitted.point_grid(&self.checks, &self.checks);
         let distance = |(weights, got): (&JetWeights, &DVec3)| point(weights).distance(*got);
@@ -157,7 +210,9 @@ mod tests {
             let surface = SubdivisionSurface::new(&mesh, &Creases::none(), blend).unwrap();
             let splines = spline_patches(&mesh, &surface).unwrap();
             assert_eq!(splines.surfaces.len(), mesh.face_count());
-            assert_eq!(splines.fitted, 4 * 6);
+            // Two rings around each vertex of the theta graph's four.
+            let patches = if blend == Blend::Smooth { 4 * 6 * 4 } else { 4 * 6 };
+            assert_eq!(splines.fitted, patches);
             let size = mesh.mean_edge_length();
             let bound = if blend == Blend::Smooth { 2e-5 } else { 2e-3 };
             assert!(splines.max_deviation < bound * size, "{blend:?}: {}", splines.max_deviation);

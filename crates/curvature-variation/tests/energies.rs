@@ -50,7 +50,7 @@ fn gauss_bonnet_holds_on_every_closed_surface() {
         ("torus", quad_graphs::torus(12, 8, 1.0, 0.5)),
         ("sheared torus", quad_graphs::sheared_torus(16, 12, 1.0, clifford, [1, 0], [1, 1])),
     ] {
-        let found = analyze(&mesh, Blend::Smooth).expect("a surface");
+        let found = analyze(&mesh, Blend::Smooth, None).expect("a surface");
         let residual = found.gauss_bonnet_residual.expect("a closed surface");
         assert!(residual < 2e-4, "{name}: {residual}");
         // The normal quadrature, which descents use, is as good.
@@ -62,7 +62,7 @@ fn gauss_bonnet_holds_on_every_closed_surface() {
         assert!((got - want).abs() < 2e-4 * total, "{name}: {got} against {want}");
     }
     for open in [quad_graphs::vase(12), quad_graphs::sheet_with_tube(6)] {
-        let found = analyze(&open, Blend::Smooth).expect("a surface");
+        let found = analyze(&open, Blend::Smooth, None).expect("a surface");
         assert_eq!(found.gauss_bonnet_residual, None);
     }
 }

@@ -9,8 +9,8 @@ const DEGREE: usize = 5;
 /// Number of monomials up to that degree.
 pub(crate) const MONOMIALS: usize = (DEGREE + 1) * (DEGREE + 2) / 2;
 /// Cells per side and Gauss points per cell side of the integral the guide minimises.
-const CELLS: usize = 4;
-const GAUSS_6: [(f64, f64); 6] = [
+pub(crate) const CELLS: usize = 4;
+pub(crate) const GAUSS_6: [(f64, f64); 6] = [
     (0.033_765_242_898_423_99, 0.085_662_246_189_585_17),
     (0.169_395_306_766_867_74, 0.180_380_786_524_069_3),
     (0.380_690_406_958_401_55, 0.233_956_967_286_345_52),
@@ -131,7 +131,8 @@ impl Guide {
                     let v = corner[1] + y / CELLS as f64;
                     let measure = wx * wy / (CELLS * CELLS) as f64;
                     let repair = repair_weights(n, &weights, u, v);
-                    sample_rows(&weights(u, v), &repair, map, u, v, measure, &mut rows);
+                    let fade = weight_jet(septic_step, u, v);
+                    sample_rows(&weights(u, v), Some(&repair), map, &fade, measure, &mut rows);
                 }
             }
         }
@@ -236,7 +237,7 @@ pub(crate) fn coordinate_jets(plain: &JetWeights, map: &[[f64; 2]]) -> [Jet; 2] 
     })
 }
 
-fn monomial_jets(coordinates: &[Jet; 2]) -> [Jet; MONOMIALS] {
+pub(crate) fn monomial_jets(coordinates: &[Jet; 2]) -> [Jet; MONOMIALS] {
     let mut out = [[0.0; JET_LEN]; MONOMIALS];
     out[0][0] = 1.0;
     for (k, (i, j)) in exponents().into_iter().enumerate().skip(1) {
@@ -251,12 +252,11 @@ fn monomial_jets(coordinates: &[Jet; 2]) -> [Jet; MONOMIALS] {
 
 /// The four weighted third derivatives by `(ξ, η)` at one sample: of `w` times each monomial, then
 /// of `1 − w` times each repair and each control point's weight.
-fn sample_rows(
+pub(crate) fn sample_rows(
     plain: &JetWeights,
-    repair: &JetWeights,
+    repair: Option<&JetWeights>,
     map: &[[f64; 2]],
-    u: f64,
-    v: f64,
+    fade: &Jet,
     measure: f64,
     rows: &mut Vec<f64>,
 ) {
@@ -275,12 +275,11 @@ fn sample_rows(
             system[d][k] = taylor[k][d];
         }
     }
-    let fade = weight_jet(septic_step, u, v);
     let mut rest = fade.map(|x| -x);
     rest[0] += 1.0;
     let mut columns: Vec<Jet> =
-        monomial_jets(&coordinates).iter().map(|m| jet_product(&fade, m)).collect();
-    for weights in [repair, plain] {
+        monomial_jets(&coordinates).iter().map(|m| jet_product(fade, m)).collect();
+    for weights in repair.into_iter().chain([plain]) {
         columns.extend((0..weights.control_points()).map(|k| jet_product(&rest, &weights.jet(k))));
     }
     solve_jets(&mut system, &mut columns);
@@ -319,7 +318,7 @@ fn solve_jets(system: &mut [[f64; JET_LEN]; JET_LEN], columns: &mut [Jet]) {
 }
 
 /// Row `k`: the monomial `k` of the rotated coordinates as a combination of monomials.
-fn rotated_monomials(angle: f64) -> Vec<f64> {
+pub(crate) fn rotated_monomials(angle: f64) -> Vec<f64> {
     let (s, c) = angle.sin_cos();
     let mut out = vec![0.0; MONOMIALS * MONOMIALS];
     out[0] = 1.0;
@@ -340,7 +339,7 @@ fn rotated_monomials(angle: f64) -> Vec<f64> {
 
 /// Householder QR of the first `pivots` columns of a row-major matrix, applied to all of them; the
 /// triangle ends up in the first rows.
-fn householder(matrix: &mut [f64], width: usize, pivots: usize) {
+pub(crate) fn householder(matrix: &mut [f64], width: usize, pivots: usize) {
     let rows = matrix.len() / width;
     let mut reflector = vec![0.0; rows];
     let mut products = vec![0.0; width];

@@ -33,7 +33,9 @@ mod jet;
 mod limit;
 mod local;
 mod refine;
+mod regions;
 mod surface;
+mod wide;
 
 pub use blend::{Blend, flat_step, septic_step};
 pub use characteristic::{LimitMasks, limit_masks, subdominant_eigenvalue};
@@ -41,4 +43,6 @@ pub use crease::{CreaseError, CreaseList, Creases, INFINITE_SHARPNESS};
 pub use jet::{JET_LEN, JET_ORDERS, Jet, JetWeights, cubic_basis, jet_product};
 pub use limit::{LimitFrame, limit_frames};
 pub use refine::{Refined, Stencils, refine};
-pub use surface::{BasisId, Patch, SubdivisionError, SubdivisionSurface, refinements_needed};
+pub use surface::{
+    BasisId, GuideSector, Patch, SubdivisionError, SubdivisionSurface, refinements_needed,
+};

@@ -80,8 +80,6 @@ fn frame(mesh: &PolyMesh, surface: &SubdivisionSurface, v: VertexId) -> Option<L
             weights.row_mut(d).iter_mut().for_each(|w| *w /= size);
         }
     }
-    let list = |d: usize| -> Vec<(u32, f64)> {
-        patch.controls.iter().copied().zip(weights.row(d).iter().copied()).collect()
-    };
+    let list = |d: usize| surface.on_vertices(patch, weights.row(d));
     Some(LimitFrame { position: list(0), tangents: [list(1), list(2)] })
 }

@@ -4,11 +4,15 @@ use crate::blend::{Blend, flat_step, weight_jet};
 use crate::characteristic::{characteristic_map, limit_masks};
 use crate::classes::Classes;
 use crate::crease::{Creases, Tags};
-use crate::guide::{Guide, coordinate_jets};
+use crate::guide::{Guide, MONOMIALS, coordinate_jets};
 use crate::jet::{JET_LEN, Jet, JetWeights, jet_product};
 use crate::local::LocalPatch;
+use crate::regions::{RegionFace, Regions};
+use crate::wide::{Cell, WideGuide};
 use geom_core::{DVec3, FaceId, HalfEdgeId, PolyMesh, SurfaceJet, VertexId};
 use std::collections::HashMap;
+use std::collections::hash_map::Entry;
+use std::sync::Arc;
 
 /// Why a control mesh cannot be evaluated.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -40,6 +44,7 @@ enum Basis {
     Plain { class: usize },
     Guided { class: usize, map: Vec<[f64; 2]>, guide: Guide },
     Flat { class: usize, map: Vec<[f64; 2]>, valence: usize },
+    Wide { class: usize, cell: Cell, guide: Arc<WideGuide> },
 }
 
 /// One quad's piece of the limit surface, over the unit square.
@@ -51,8 +56,44 @@ pub struct Patch {
     pub corner: HalfEdgeId,
     /// Which weights it uses.
     pub basis: BasisId,
-    /// Vertices the weights apply to.
+    /// What the weights apply to: vertices, and from the number of vertices on the coefficients of
+    /// guides, see [`GuideSector`].
     pub controls: Vec<u32>,
+}
+
+/// One sector of a smooth blend of several rings.
+///
+/// The patches of such a blend take the coefficients of its guide as further control points, which
+/// keeps them small. The coefficients are numbered on after the mesh's vertices, and are linear in
+/// the vertices around the blend.
+#[derive(Clone, Debug)]
+pub struct GuideSector {
+    /// Number of the first coefficient.
+    pub first: u32,
+    /// The vertices the coefficients depend on: the same for all sectors of a blend, but each in an
+    /// order of its own.
+    pub vertices: Vec<u32>,
+    guide: Arc<WideGuide>,
+    class: usize,
+}
+
+impl GuideSector {
+    /// Number of coefficients.
+    pub const COEFFICIENTS: usize = MONOMIALS;
+
+    /// The weights of the vertices in coefficient `k`.
+    ///
+    /// # Panics
+    /// If `k` is not below [`Self::COEFFICIENTS`].
+    #[must_use]
+    pub fn weights(&self, k: usize) -> &[f64] {
+        self.guide.coefficient(k)
+    }
+
+    fn coefficient(&self, k: usize, positions: &[DVec3]) -> DVec3 {
+        let vertices = self.vertices.iter().map(|&v| positions[v as usize]);
+        self.weights(k).iter().zip(vertices).map(|(&w, p)| w * p).sum()
+    }
 }
 
 /// A Catmull-Clark limit surface with exact evaluation (Stam 1998, by powers of the subdivision
@@ -68,6 +109,10 @@ pub struct SubdivisionSurface {
     patches: Vec<Patch>,
     regular: Option<BasisId>,
     blend: Blend,
+    vertex_count: usize,
+    sectors: Vec<GuideSector>,
+    // Of every blended vertex.
+    rings: Vec<usize>,
 }
 
 impl SubdivisionSurface {
@@ -79,6 +124,24 @@ impl SubdivisionSurface {
     /// # Errors
     /// [`SubdivisionError`] names the first face or vertex at fault.
     pub fn new(mesh: &PolyMesh, creases: &Creases, blend: Blend) -> Result<Self, SubdivisionError> {
+        Self::with_rings(mesh, creases, blend, None)
+    }
+
+    /// As [`Self::new`], with smooth blends that cover `rings` rings of patches around every
+    /// extraordinary vertex.
+    ///
+    /// A blend reaches at most half the way to the next vertex that is not regular, and one ring at
+    /// least. `None` takes a quarter of that way and one ring more, as long as the blend has no more
+    /// than 121 control points, or 2.7 times as many as the way has rings.
+    ///
+    /// # Errors
+    /// As [`Self::new`].
+    pub fn with_rings(
+        mesh: &PolyMesh,
+        creases: &Creases,
+        blend: Blend,
+        rings: Option<usize>,
+    ) -> Result<Self, SubdivisionError> {
         for f in mesh.faces() {
             if mesh.face_degree(f) != 4 {
                 let corners = mesh.face_degree(f);
@@ -96,13 +159,23 @@ impl SubdivisionSurface {
                 patches: Vec::with_capacity(mesh.face_count()),
                 regular: None,
                 blend,
+                vertex_count: mesh.vertex_count(),
+                sectors: Vec::new(),
+                rings: Vec::new(),
             },
             interior: HashMap::new(),
+            wide: HashMap::new(),
             by_class: HashMap::new(),
         };
         let blended = builder.blended_vertices()?;
+        let regions = if blend == Blend::Smooth {
+            Regions::new(mesh, &blended, &|v| builder.is_regular(v), rings)
+        } else {
+            Regions::default()
+        };
+        builder.add_sectors(&regions)?;
         for f in mesh.faces() {
-            builder.add_patch(f, &blended)?;
+            builder.add_patch(f, &blended, &regions)?;
         }
         Ok(builder.surface)
     }
@@ -132,10 +205,70 @@ impl SubdivisionSurface {
         self.blend
     }
 
+    /// Fewest and most rings of patches of a smooth blend; `None` without such blends.
+    #[must_use]
+    pub fn blend_rings(&self) -> Option<[usize; 2]> {
+        Some([*self.rings.iter().min()?, *self.rings.iter().max()?])
+    }
+
+    /// The sectors of all blends of more than one ring.
+    #[must_use]
+    pub fn sectors(&self) -> &[GuideSector] {
+        &self.sectors
+    }
+
+    /// The sector a control point of a patch belongs to if it is no vertex, and its place there.
+    #[must_use]
+    pub fn coefficient(&self, control: u32) -> Option<(&GuideSector, usize)> {
+        let place = (control as usize).checked_sub(self.vertex_count)?;
+        Some((&self.sectors[place / MONOMIALS], place % MONOMIALS))
+    }
+
+    /// All control points: the mesh's vertices, then the coefficients of guides.
+    ///
+    /// # Panics
+    /// If `positions` is shorter than the mesh's vertices.
+    #[must_use]
+    pub fn control_points(&self, positions: &[DVec3]) -> Vec<DVec3> {
+        let mut out = positions[..self.vertex_count].to_vec();
+        for sector in &self.sectors {
+            out.extend((0..MONOMIALS).map(|k| sector.coefficient(k, positions)));
+        }
+        out
+    }
+
+    /// Weights on a patch's controls as weights on vertices.
+    pub(crate) fn on_vertices(&self, patch: &Patch, weights: &[f64]) -> Vec<(u32, f64)> {
+        if let Basis::Wide { cell, guide, .. } = &self.bases[patch.basis.0]
+            && let Some((sector, _)) = patch.controls.last().and_then(|&c| self.coefficient(c))
+        {
+            let spread = guide.spread(*cell, weights);
+            return sector.vertices.iter().copied().zip(spread).collect();
+        }
+        patch.controls.iter().copied().zip(weights.iter().copied()).collect()
+    }
+
     /// Whether the patches of a basis touch a blended extraordinary vertex (at `(0, 0)`).
     #[must_use]
     pub fn is_blended(&self, basis: BasisId) -> bool {
-        !matches!(self.bases[basis.0], Basis::Plain { .. })
+        !matches!(self.bases[basis.0], Basis::Plain { .. }) && !self.is_smooth(basis)
+    }
+
+    /// Whether the patches of a basis belong to a blend of several rings.
+    #[must_use]
+    pub fn is_wide(&self, basis: BasisId) -> bool {
+        matches!(self.bases[basis.0], Basis::Wide { .. })
+    }
+
+    /// Whether the patches of a basis have all derivatives: B-splines and those inside of a wide
+    /// blend that do not touch its vertex.
+    #[must_use]
+    pub fn is_smooth(&self, basis: BasisId) -> bool {
+        match &self.bases[basis.0] {
+            Basis::Plain { class } => self.classes.grid(*class).is_some(),
+            Basis::Wide { cell, .. } => *cell != (0, 0),
+            _ => false,
+        }
     }
 
     /// For a bi-cubic B-spline patch the control points as combinations `(position in the patch's
@@ -159,6 +292,9 @@ impl SubdivisionSurface {
             Basis::Guided { class, map, guide } => {
                 guide.blend(|u, v| self.classes.weights(*class, u, v), map, u, v)
             }
+            Basis::Wide { class, cell, guide } => {
+                guide.local_weights(*cell, |u, v| self.classes.weights(*class, u, v), u, v)
+            }
             Basis::Flat { class, map, valence } => {
                 flat_weights(&self.classes.weights(*class, u, v), map, *valence, u, v)
             }
@@ -167,11 +303,22 @@ impl SubdivisionSurface {
 
     /// Position and derivatives of a patch at `(u, v)`.
     ///
+    /// `positions` are the mesh's vertices or, which is faster for many points of wide blends, the
+    /// [`Self::control_points`].
+    ///
     /// # Panics
     /// If `positions` is shorter than the mesh's vertices.
     #[must_use]
     pub fn evaluate(&self, positions: &[DVec3], patch: &Patch, u: f64, v: f64) -> SurfaceJet {
-        self.weights(patch.basis, u, v).apply(|k| positions[patch.controls[k] as usize])
+        self.weights(patch.basis, u, v).apply(|k| {
+            let control = patch.controls[k];
+            match self.coefficient(control) {
+                Some((sector, k)) if control as usize >= positions.len() => {
+                    sector.coefficient(k, positions)
+                }
+                _ => positions[control as usize],
+            }
+        })
     }
 
     /// Control points of a patch as a bi-cubic Bezier patch, `points[i][j]` for the `i`-th column
@@ -244,6 +391,8 @@ struct Builder<'a> {
     surface: SubdivisionSurface,
     // Bases of patches without crease or boundary, by (valence of the first corner, blended).
     interior: HashMap<(usize, bool), BasisId>,
+    // Patches of wide blends by number of control points, rings and cell.
+    wide: HashMap<(usize, usize, Cell), BasisId>,
     by_class: HashMap<usize, BasisId>,
 }
 
@@ -283,8 +432,18 @@ impl Builder<'_> {
         Ok(blended)
     }
 
-    fn add_patch(&mut self, face: FaceId, blended: &[bool]) -> Result<(), SubdivisionError> {
+    fn add_patch(
+        &mut self,
+        face: FaceId,
+        blended: &[bool],
+        regions: &Regions,
+    ) -> Result<(), SubdivisionError> {
         let mesh = self.mesh;
+        if let Some(here) = regions.faces.get(&face) {
+            let patch = self.wide_patch(face, here);
+            self.surface.patches.push(patch);
+            return Ok(());
+        }
         let first = mesh.face_half_edge(face);
         let sides: Vec<HalfEdgeId> = mesh.face_half_edges(face).collect();
         let odd: Vec<HalfEdgeId> =
@@ -334,27 +493,86 @@ impl Builder<'_> {
         n: usize,
         blended: bool,
     ) -> Result<BasisId, SubdivisionError> {
-        let overlapping = SubdivisionError::Overlapping { face: face.index() };
-        let (local, _) =
-            LocalPatch::cut(self.mesh, self.tags, corner).ok_or(overlapping.clone())?;
-        let class = self.surface.classes.insert(&local).ok_or(overlapping.clone())?;
-        let classes = &self.surface.classes;
-        if classes.vertex_count(class) != 2 * n + 8 {
-            return Err(overlapping);
+        let class = self.interior_class(face.index(), corner, n)?;
+        if !blended {
+            return Ok(self.push_basis(Basis::Plain { class }));
         }
-        let basis = if blended {
-            let matrix = classes.subdivision_matrix(class).ok_or(overlapping)?;
-            let map = characteristic_map(n, matrix);
-            if self.surface.blend == Blend::Smooth {
-                let guide = Guide::new(n, &map, |u, v| classes.weights(class, u, v));
-                Basis::Guided { class, map, guide }
-            } else {
-                Basis::Flat { class, map, valence: n }
-            }
+        let map = self.characteristic_map(face.index(), class, n)?;
+        let classes = &self.surface.classes;
+        let basis = if self.surface.blend == Blend::Smooth {
+            let guide = Guide::new(n, &map, |u, v| classes.weights(class, u, v));
+            Basis::Guided { class, map, guide }
         } else {
-            Basis::Plain { class }
+            Basis::Flat { class, map, valence: n }
         };
         Ok(self.push_basis(basis))
+    }
+
+    /// Makes the guides of the blends of several rings.
+    fn add_sectors(&mut self, regions: &Regions) -> Result<(), SubdivisionError> {
+        self.surface.rings.clone_from(&regions.rings);
+        let mut guides: HashMap<(usize, usize), (usize, Arc<WideGuide>)> = HashMap::new();
+        for sector in &regions.sectors {
+            let (n, rings) = (sector.valence, sector.rings);
+            let (class, guide) = match guides.entry((n, rings)) {
+                Entry::Occupied(entry) => entry.get().clone(),
+                Entry::Vacant(entry) => {
+                    let face = self.mesh.face(sector.spoke).map_or(0, FaceId::index);
+                    let class = self.interior_class(face, sector.spoke, n)?;
+                    let map = self.characteristic_map(face, class, n)?;
+                    let classes = &self.surface.classes;
+                    let weights = |u, v| classes.weights(class, u, v);
+                    entry.insert((class, Arc::new(WideGuide::new(n, rings, &map, weights)))).clone()
+                }
+            };
+            let first = self.surface.vertex_count + MONOMIALS * self.surface.sectors.len();
+            let (first, vertices) = (first as u32, sector.vertices.clone());
+            self.surface.sectors.push(GuideSector { first, vertices, guide, class });
+        }
+        Ok(())
+    }
+
+    /// Class of a patch whose corners are regular, except perhaps the one `corner` leaves.
+    fn interior_class(
+        &mut self,
+        face: usize,
+        corner: HalfEdgeId,
+        n: usize,
+    ) -> Result<usize, SubdivisionError> {
+        let overlapping = SubdivisionError::Overlapping { face };
+        let (local, _) =
+            LocalPatch::cut(self.mesh, self.tags, corner).ok_or(overlapping.clone())?;
+        let classes = &mut self.surface.classes;
+        let class = classes.insert(&local).ok_or(overlapping.clone())?;
+        if classes.vertex_count(class) == 2 * n + 8 { Ok(class) } else { Err(overlapping) }
+    }
+
+    fn characteristic_map(
+        &self,
+        face: usize,
+        class: usize,
+        n: usize,
+    ) -> Result<Vec<[f64; 2]>, SubdivisionError> {
+        let matrix = self.surface.classes.subdivision_matrix(class);
+        Ok(characteristic_map(n, matrix.ok_or(SubdivisionError::Overlapping { face })?))
+    }
+
+    fn wide_patch(&mut self, face: FaceId, here: &RegionFace) -> Patch {
+        let sector = &self.surface.sectors[here.sector];
+        let (class, guide) = (sector.class, Arc::clone(&sector.guide));
+        let columns = guide.columns(here.cell);
+        let mut controls: Vec<u32> = columns.iter().map(|&c| sector.vertices[c]).collect();
+        controls.extend((0..MONOMIALS as u32).map(|k| sector.first + k));
+        let key = (guide.points(), guide.rings(), here.cell);
+        let basis = match self.wide.get(&key) {
+            Some(&id) => id,
+            None => {
+                let id = self.push_basis(Basis::Wide { class, cell: here.cell, guide });
+                self.wide.insert(key, id);
+                id
+            }
+        };
+        Patch { face, corner: here.corner, basis, controls }
     }
 
     fn push_basis(&mut self, basis: Basis) -> BasisId {

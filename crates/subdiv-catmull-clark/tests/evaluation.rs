@@ -114,11 +114,10 @@ fn every_valence_matches_differences_and_refinement() {
             let patch = patch_at(&mesh, &surface, 0);
             let tol = if blend == Blend::Flat { 2e-3 } else { 2e-5 };
             check_by_differences(&mesh, &surface, &patch, tol);
-            let weights = surface.weights(patch.basis, 0.3, 0.2);
-            assert!((weights.row(0).iter().sum::<f64>() - 1.0).abs() < 1e-12);
-            for d in 1..10 {
-                assert!(weights.row(d).iter().sum::<f64>().abs() < 1e-10, "valence {n}");
-            }
+            let ones = vec![DVec3::ONE; mesh.vertex_count()];
+            let jet = surface.evaluate(&ones, &patch, 0.3, 0.2).derivatives;
+            assert!(jet[0].distance(DVec3::ONE) < 1e-12, "valence {n}");
+            assert!(jet[1..10].iter().all(|d| d.length() < 1e-10), "valence {n}");
         }
         // Without a blend the limit surface does not change under refinement.
         let surface = SubdivisionSurface::new(&mesh, &Creases::none(), Blend::None).unwrap();
@@ -186,6 +185,69 @@ fn blended_surface_is_twice_continuous() {
             }
         }
     }
+}
+
+#[test]
+fn wide_blends_are_twice_continuous_everywhere() {
+    for (n, rings) in [(3, 2), (3, 4), (5, 3), (8, 2)] {
+        let mesh = star(n, 2 * rings + 1);
+        let rings = Some(rings as usize);
+        let surface =
+            SubdivisionSurface::with_rings(&mesh, &Creases::none(), Blend::Smooth, rings).unwrap();
+        assert_eq!(surface.blend_rings(), rings.map(|r| [r, r]));
+        let positions = surface.control_points(mesh.positions());
+        // From the left of a half-edge, at `t` of its length.
+        let beside = |h: geom_core::HalfEdgeId, t: f64| {
+            let patch = &surface.patches()[mesh.face(h)?.index()];
+            let mut corner = patch.corner;
+            let mut turns = 0;
+            while corner != h {
+                corner = mesh.next(corner);
+                turns += 1;
+            }
+            let (u, v) = [(t, 0.0), (1.0, t), (1.0 - t, 1.0), (0.0, 1.0 - t)][turns];
+            let fast = surface.evaluate(&positions, patch, u, v);
+            let slow = surface.evaluate(mesh.positions(), patch, u, v);
+            assert!(fast.position().distance(slow.position()) < 1e-12);
+            Some(shape(&fast.derivatives))
+        };
+        for h in mesh.edges() {
+            for t in [0.05, 0.4, 0.9] {
+                let (Some(a), Some(b)) = (beside(h, t), beside(mesh.twin(h), 1.0 - t)) else {
+                    continue;
+                };
+                let scale = 1.0 + a.2 * a.2 + a.3.abs();
+                let gap = (a.2 - b.2).abs().max((a.3 - b.3).abs()) / scale;
+                assert!(a.0.distance(b.0) < 1e-11 && a.1.distance(b.1) < 1e-9 && gap < 1e-8);
+            }
+        }
+        // Frames name vertices only, and those of the blend's inner vertices see the blend.
+        for (v, frame) in limit_frames(&mesh, &surface).iter().enumerate() {
+            let frame = frame.as_ref().unwrap();
+            let h = mesh.outgoing_half_edges(VertexId(v as u32)).find(|&h| mesh.face(h).is_some());
+            let Some(want) = h.and_then(|h| beside(h, 0.0)) else { continue };
+            assert!(frame.point(mesh.positions()).distance(want.0) < 1e-12, "vertex {v}");
+        }
+    }
+}
+
+#[test]
+fn blends_keep_away_from_boundaries_and_creases() {
+    // The boundary is 9 rings away.
+    let mesh = star(3, 9);
+    let rings = |creases: &Creases, wanted| {
+        SubdivisionSurface::with_rings(&mesh, creases, Blend::Smooth, wanted)
+            .unwrap()
+            .blend_rings()
+            .unwrap()
+    };
+    let mut creases = Creases::none();
+    assert_eq!(rings(&creases, Some(1)), [1, 1]);
+    assert_eq!(rings(&creases, Some(50)), [4, 4]);
+    assert_eq!(rings(&creases, None), [3, 3]);
+    // From the spoke's fifth vertex to the sixth.
+    creases.set(VertexId(41), VertexId(51), 1.0);
+    assert_eq!(rings(&creases, Some(50)), [2, 2]);
 }
 
 #[test]
