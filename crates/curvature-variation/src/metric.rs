@@ -7,15 +7,14 @@ use crate::freedom::Freedom;
 use crate::guide_block::{GuideBlock, is_guided};
 use crate::kernel::{gather, table_adjoint, table_derivatives};
 use crate::lanes::{Lanes, align_frame};
-use crate::rules::{MAX_LANES, Table};
+use crate::rules::{MAX_LANES, Quadrature, Table};
 use gp_solver::{SolverError, SparseCholesky, SymmetricPattern};
 use pulp::{Simd, WithSimd};
 use rayon::prelude::*;
 use subdiv_catmull_clark::SubdivisionSurface;
 
 /// Gauss points per side the metrics use: they need not be exact.
-const REGULAR_NODES: usize = 4;
-const EXTRAORDINARY_NODES: usize = 8;
+const NODES: Quadrature = Quadrature { regular: 4, extraordinary: 8 };
 /// Element matrices computed at a time before they are added up.
 const BATCH: usize = 64;
 /// `ℓ²` of the Sobolev norm as a share of the area.
@@ -66,8 +65,7 @@ impl MetricAssembly {
             .groups()
             .par_iter()
             .map(|group| {
-                let smooth = surface.is_smooth(group.basis);
-                let nodes = if smooth { REGULAR_NODES } else { EXTRAORDINARY_NODES };
+                let nodes = NODES.nodes(surface, group.basis);
                 Table::new(surface, group.basis, nodes)
             })
             .collect();

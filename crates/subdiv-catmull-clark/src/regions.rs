@@ -7,7 +7,7 @@ use std::collections::HashMap;
 /// Control points of a blend, unasked, and how many more per ring to the next vertex that is not
 /// regular. All of them depend on one another, which a Gauss-Newton matrix has to hold; in
 /// proportion to the distance they stay a fixed share of all couplings of a mesh.
-const MOST_POINTS: usize = 121;
+const MOST_POINTS: usize = 130;
 const POINTS_PER_DISTANCE: f64 = 2.7;
 /// How far to look for the next vertex that is not regular.
 const FARTHEST: usize = 256;

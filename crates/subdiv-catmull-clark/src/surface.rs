@@ -132,7 +132,7 @@ impl SubdivisionSurface {
     ///
     /// A blend reaches at most half the way to the next vertex that is not regular, and one ring at
     /// least. `None` takes a quarter of that way and one ring more, as long as the blend has no more
-    /// than 121 control points, or 2.7 times as many as the way has rings.
+    /// than 130 control points, or 2.7 times as many as the way has rings.
     ///
     /// # Errors
     /// As [`Self::new`].
