@@ -278,11 +278,15 @@ pub fn fair(
         let (levels, vertices, limit) = (options.levels, estimate, MAX_VERTICES);
         return Err(FairError::TooManyLevels { levels, vertices, limit });
     }
-    let initial = mesh.clone();
-    let initial_surface = options.surface_of(&initial, &creases)?;
-    let before = energies(&initial, &initial_surface, constraints, options.quadrature);
-    let area = before.get(Functional::Area);
-    let places = pulled_places(constraints, &initial, &initial_surface, area);
+    let (initial, initial_creases) = (mesh.clone(), creases.clone());
+    // Made anew at the end: no need to keep it while factors take most of the memory.
+    let (before, area, places) = {
+        let surface = options.surface_of(&initial, &creases)?;
+        let before = energies(&initial, &surface, constraints, options.quadrature);
+        let area = before.get(Functional::Area);
+        let places = pulled_places(constraints, &initial, &surface, area);
+        (before, area, places)
+    };
     let mut levels = Vec::new();
     let mut gradient_norm = f64::NAN;
     let mut interrupted = false;
@@ -327,6 +331,7 @@ pub fn fair(
         // A sharp edge holds curvature that the patches do not have.
         report.gauss_bonnet_residual = f64::NAN;
     }
+    let initial_surface = options.surface_of(&initial, &initial_creases)?;
     Ok(Fairing { initial, initial_surface, mesh, creases, surface, report })
 }
 

@@ -4,10 +4,12 @@ use crate::wide::{Cell, ring_points};
 use geom_core::{FaceId, HalfEdgeId, PolyMesh, VertexId};
 use std::collections::HashMap;
 
-/// Control points of a blend, unasked, and how many more per ring to the next vertex that is not
-/// regular. All of them depend on one another, which a Gauss-Newton matrix has to hold; in
-/// proportion to the distance they stay a fixed share of all couplings of a mesh.
-const MOST_POINTS: usize = 130;
+/// Rings of a blend, unasked, and control points: each of its patches takes as long to evaluate as
+/// ten others, and all its control points depend on one another, which a Gauss-Newton matrix has to
+/// hold. In proportion to the distance both stay a fixed share of those of the whole mesh.
+const MOST_RINGS: usize = 3;
+const DISTANCE_PER_RING: usize = 10;
+const MOST_POINTS: usize = 170;
 const POINTS_PER_DISTANCE: f64 = 2.7;
 /// How far to look for the next vertex that is not regular.
 const FARTHEST: usize = 256;
@@ -20,7 +22,8 @@ const FARTHEST: usize = 256;
 /// should fall as the mesh becomes finer, and cost sets a limit.
 fn automatic_rings(n: usize, distance: usize) -> usize {
     let most_points = MOST_POINTS.max((POINTS_PER_DISTANCE * distance as f64) as usize);
-    let mut rings = (distance / 4 + 1).min(distance / 2).max(1);
+    let most_rings = MOST_RINGS.max(distance / DISTANCE_PER_RING);
+    let mut rings = (distance / 4 + 1).min(distance / 2).clamp(1, most_rings);
     while rings > 1 && ring_points(n, rings + 1) > most_points {
         rings -= 1;
     }

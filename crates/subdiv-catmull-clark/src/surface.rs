@@ -131,8 +131,8 @@ impl SubdivisionSurface {
     /// extraordinary vertex.
     ///
     /// A blend reaches at most half the way to the next vertex that is not regular, and one ring at
-    /// least. `None` takes a quarter of that way and one ring more, as long as the blend has no more
-    /// than 130 control points, or 2.7 times as many as the way has rings.
+    /// least. `None` takes a quarter of that way and one ring more, but at most three or a tenth of
+    /// the way, and 170 control points or 2.7 for every ring of it.
     ///
     /// # Errors
     /// As [`Self::new`].
