@@ -148,6 +148,8 @@ struct SubdivisionMetrics {
     #[serde(skip_serializing_if = "Option::is_none")]
     torus_fit_rms: Option<f64>,
     patches: usize,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    blend_rings: Option<[usize; 2]>,
 }
 
 impl SubdivisionMetrics {
@@ -160,6 +162,7 @@ impl SubdivisionMetrics {
             torus_ratio: torus.map(|(torus, _)| torus.ratio()),
             torus_fit_rms: torus.map(|(_, rms)| rms),
             patches: found.mesh.face_count(),
+            blend_rings: found.surface.blend_rings(),
         }
     }
 }

@@ -164,6 +164,10 @@ fn irregular_distance(
                 }
             }
         }
+        if next.is_empty() {
+            // The whole mesh is nearer.
+            return distance;
+        }
         ring = next;
     }
     farthest

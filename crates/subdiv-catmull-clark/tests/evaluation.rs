@@ -231,6 +231,42 @@ fn wide_blends_are_twice_continuous_everywhere() {
     }
 }
 
+/// Three squares glued along their sides to a closed surface of genus 2: all their corners are one
+/// vertex, of valence 12, the only one that is not regular.
+#[test]
+fn a_blend_that_is_asked_to_cover_everything_meets_itself_and_stops() {
+    let (n, right, up) = (6, [1, 0, 2], [2, 1, 0]);
+    let at = |k: usize, i: u32, j: u32| -> u32 {
+        let k = if i == n { right[k] } else { k };
+        let k = if j == n { up[k] } else { k };
+        match (i % n, j % n) {
+            (0, 0) => 0,
+            (i, j) => 1 + k as u32 * n * n + i * n + j,
+        }
+    };
+    let mut faces = Vec::new();
+    for k in 0..3 {
+        for i in 0..n {
+            for j in 0..n {
+                faces.push([at(k, i, j), at(k, i + 1, j), at(k, i + 1, j + 1), at(k, i, j + 1)]);
+            }
+        }
+    }
+    let mut numbers: Vec<u32> = faces.iter().flatten().copied().collect();
+    numbers.sort_unstable();
+    numbers.dedup();
+    for v in faces.iter_mut().flatten() {
+        *v = numbers.binary_search(v).expect("listed") as u32;
+    }
+    let place = |k: usize| DVec3::new((k as f64).sin(), (1.7 * k as f64).cos(), 0.3 * k as f64);
+    let mesh = PolyMesh::new((0..numbers.len()).map(place).collect(), &faces).expect("closed");
+    assert_eq!(mesh.valence(VertexId(0)), 12);
+    let all = Some(usize::MAX);
+    let surface = SubdivisionSurface::with_rings(&mesh, &Creases::none(), Blend::Smooth, all);
+    let [fewest, most] = surface.expect("a surface").blend_rings().expect("a blend");
+    assert!(1 <= fewest && fewest == most && most <= 3, "{most}");
+}
+
 #[test]
 fn blends_keep_away_from_boundaries_and_creases() {
     // The boundary is 9 rings away.
