@@ -163,18 +163,7 @@ impl Guide {
                 stacked.extend(row);
             }
         }
-        householder(&mut stacked, wide, unknowns);
-        let mut coefficients = vec![0.0; unknowns * points];
-        for i in (0..unknowns).rev() {
-            for c in 0..points {
-                let mut value = -stacked[i * wide + unknowns + c];
-                for k in i + 1..unknowns {
-                    value -= stacked[i * wide + k] * coefficients[k * points + c];
-                }
-                coefficients[i * points + c] = value / stacked[i * wide + i];
-            }
-        }
-        Self { valence: n, coefficients }
+        Self { valence: n, coefficients: minimizers(&mut stacked, wide, unknowns) }
     }
 
     /// Number of control points: the vertex and its two rings.
@@ -332,6 +321,24 @@ pub(crate) fn rotated_monomials(angle: f64) -> Vec<f64> {
                 out[k * MONOMIALS + jet_index(p + 1, q)] += factors[0] * value;
                 out[k * MONOMIALS + jet_index(p, q + 1)] += factors[1] * value;
             }
+        }
+    }
+    out
+}
+
+/// The unknowns that minimise the squares of the rows, as linear functions of the rest:
+/// `unknowns × (width − unknowns)`, row-major.
+pub(crate) fn minimizers(rows: &mut [f64], width: usize, unknowns: usize) -> Vec<f64> {
+    householder(rows, width, unknowns);
+    let points = width - unknowns;
+    let mut out = vec![0.0; unknowns * points];
+    for i in (0..unknowns).rev() {
+        for c in 0..points {
+            let mut value = -rows[i * width + unknowns + c];
+            for k in i + 1..unknowns {
+                value -= rows[i * width + k] * out[k * points + c];
+            }
+            out[i * points + c] = value / rows[i * width + i];
         }
     }
     out

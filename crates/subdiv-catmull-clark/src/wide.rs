@@ -3,8 +3,8 @@
 use crate::blend::septic_step;
 use crate::characteristic::{characteristic_ring, subdominant_eigenvalue};
 use crate::guide::{
-    CELLS, GAUSS_6, MONOMIALS, coordinate_jets, householder, monomial_jets, rotated_monomials,
-    sample_rows,
+    CELLS, GAUSS_6, MONOMIALS, coordinate_jets, householder, minimizers, monomial_jets,
+    rotated_monomials, sample_rows,
 };
 use crate::jet::{Jet, JetWeights, cubic_basis, jet_product, separable_jet};
 use std::f64::consts::TAU;
@@ -203,18 +203,7 @@ impl WideGuide {
                 stacked.extend(row);
             }
         }
-        householder(&mut stacked, wide, MONOMIALS);
-        let mut coefficients = vec![0.0; MONOMIALS * points];
-        for i in (0..MONOMIALS).rev() {
-            for c in 0..points {
-                let mut value = -stacked[i * wide + MONOMIALS + c];
-                for k in i + 1..MONOMIALS {
-                    value -= stacked[i * wide + k] * coefficients[k * points + c];
-                }
-                coefficients[i * points + c] = value / stacked[i * wide + i];
-            }
-        }
-        this.coefficients = coefficients;
+        this.coefficients = minimizers(&mut stacked, wide, MONOMIALS);
         this
     }
 
