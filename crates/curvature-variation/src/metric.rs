@@ -142,7 +142,18 @@ impl MetricAssembly {
         let mut points = Vec::new();
         evaluator.guides().extend(positions, &mut points);
         let positions = &points[..];
-        for (group, rule) in evaluator.groups().iter().zip(&self.rules) {
+        let element = |group: usize, controls: &[u32], matrix: &mut [f64]| {
+            evaluator.arch().dispatch(ElementMatrix {
+                rule: &self.rules[group],
+                mixture,
+                positions,
+                controls,
+                area,
+                least_area: LEAST_AREA * mean_area,
+                matrix,
+            });
+        };
+        for (g, group) in evaluator.groups().iter().enumerate() {
             if is_guided(evaluator, group) {
                 continue;
             }
@@ -152,17 +163,7 @@ impl MetricAssembly {
                 matrices
                     .par_chunks_mut(width * width)
                     .zip(controls.par_chunks(group.per_patch))
-                    .for_each(|(matrix, controls)| {
-                        evaluator.arch().dispatch(ElementMatrix {
-                            rule,
-                            mixture,
-                            positions,
-                            controls,
-                            area,
-                            least_area: LEAST_AREA * mean_area,
-                            matrix,
-                        });
-                    });
+                    .for_each(|(matrix, controls)| element(g, controls, matrix));
                 for (matrix, controls) in
                     matrices.chunks(width * width).zip(controls.chunks(group.per_patch))
                 {
@@ -179,17 +180,7 @@ impl MetricAssembly {
             }
         }
         for block in &self.blocks {
-            let matrix = block.matrix(evaluator, |group, controls, matrix| {
-                evaluator.arch().dispatch(ElementMatrix {
-                    rule: &self.rules[group],
-                    mixture,
-                    positions,
-                    controls,
-                    area,
-                    least_area: LEAST_AREA * mean_area,
-                    matrix,
-                });
-            });
+            let matrix = block.matrix(evaluator, element);
             let width = 3 * block.vertices.len();
             next_pair =
                 self.scatter(&matrix, width, &block.vertices, 1.0, freedom, next_pair, &mut values);

@@ -126,7 +126,8 @@ impl SurfaceSamples {
     }
 }
 
-/// The jet at a point of a patch from all control points, next to an extraordinary corner for the corner itself.
+/// The jet at a point of a patch from all control points, next to an extraordinary corner for the
+/// corner itself.
 pub(crate) fn jet_at(
     positions: &[DVec3],
     surface: &SubdivisionSurface,
