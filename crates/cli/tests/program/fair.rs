@@ -144,7 +144,7 @@ fn quad_files_of_any_format_are_analysed_as_subdivision_surfaces() {
     let result = umbilic(&["convert", "fixtures/quads/clifford.obj", &ply]);
     assert!(result.status.success(), "{}", String::from_utf8_lossy(&result.stderr));
     let obj = fs::read_to_string(
-        Path::new(env!("CARGO_MANIFEST_DIR")).join("../fixtures/quads/clifford.obj"),
+        Path::new(env!("CARGO_MANIFEST_DIR")).join("../../fixtures/quads/clifford.obj"),
     )
     .expect("a fixture");
     let mut off = String::from("OFF\n192 192 0\n");
@@ -238,7 +238,7 @@ fn constraints_and_creases_are_read_from_files() {
     let mut args = vec![sphere, "--fix", &fix];
     args.extend(common);
     assert!(energies(&metrics(&args)).iter().all(|e| e.is_finite()));
-    let text = fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join("..").join(sphere));
+    let text = fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join("../..").join(sphere));
     let text = text.expect("a fixture");
     let face: Vec<u32> = text
         .lines()

@@ -8,7 +8,7 @@ pub(crate) const UMBILIC: &str = env!("CARGO_BIN_EXE_umbilic");
 
 /// The root of the repository, where `fixtures/` is.
 pub(crate) fn root() -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join("..")
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("../..")
 }
 
 /// Runs the program in the root of the repository.

@@ -18,7 +18,7 @@ use std::time::Instant;
 use weingarten::WeingartenOptions;
 
 /// The built-in input.
-const ROOF: &str = include_str!("../../../fixtures/roof.ron");
+const ROOF: &str = include_str!("../../../../fixtures/roof.ron");
 /// Control nets the roof is optimised at, one after the other.
 const LEVELS: [(usize, usize); 4] = [(10, 8), (14, 10), (18, 14), (25, 18)];
 /// Panels in u and v.
