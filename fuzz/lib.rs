@@ -75,7 +75,7 @@ pub fn solve(bytes: &[u8]) {
             };
         }
         if n > 0 && input.byte() == 7 {
-            problem.fix(usize::from(input.byte()) % n);
+            problem.variables_mut().fix_unknown(usize::from(input.byte()) % n);
         }
         if n > 0 && input.byte() == 9 {
             x[usize::from(input.byte()) % n] = input.number();

@@ -310,11 +310,13 @@ impl<'a> NormalNet<'a> {
             exact.reweight(weight, &x);
             let mut problem = Problem::new(start.len());
             fixed.iter().for_each(|c| {
-                problem.fix(*c);
+                problem.variables_mut().fix_unknown(*c);
             });
             // Normals, lines and curves have three unknowns each.
-            problem.set_runs(3);
-            problem.add(&mut fair).add(&mut exact).add(&mut pull);
+            problem.variables_mut().set_runs(3);
+            problem.add(&mut fair);
+            problem.add(&mut exact);
+            problem.add(&mut pull);
             let report = solve(problem, &mut x, &options).map_err(AsymptoticError::Curves)?;
             if report.status == Status::IterationLimit {
                 // No curves are near; more weights would take long to say so.

@@ -41,7 +41,7 @@ pub(crate) fn minimize(curves: &[TorsionCurve], bounds: &[[f64; 2]], tau: &mut [
         }
         for v in 0..tau.len() {
             if held[v] || !used[v] {
-                problem.fix(v);
+                problem.variables_mut().fix_unknown(v);
             }
         }
         if (0..tau.len()).all(|v| held[v] || !used[v]) {

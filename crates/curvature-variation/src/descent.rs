@@ -5,7 +5,7 @@ use crate::evaluator::{SurfaceEnergy, Workspace};
 use crate::freedom::Freedom;
 use crate::functional::{Energy, ROOT_EPSILON};
 use crate::metric::{MetricAssembly, Mixture};
-use gp_solver::{LbfgsOptions, Metric, SolverError, Status, lbfgs};
+use gp_solver::{LbfgsOptions, Metric, Progress, SolverError, Stage, Status, lbfgs};
 use std::ops::ControlFlow;
 
 /// How a level is minimised.
@@ -356,15 +356,23 @@ impl Level<'_> {
                 self.y.extend_from_slice(at);
                 self.value(epsilon_area, gradient)
             };
-            lbfgs(&mut objective, &mut projected, &mut y, &options, |seen| {
-                if seen.iteration == 0 {
-                    return ControlFlow::Continue(());
-                }
-                observer(start + seen.iteration, seen.energy)?;
-                let left = 0.5 * seen.gradient_norm * seen.gradient_norm;
-                settled = newton_like && left <= SETTLED * tolerance * seen.energy.abs();
-                if settled { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
-            })
+            let stage = Stage::only("round");
+            lbfgs(
+                &mut objective,
+                &mut projected,
+                &mut y,
+                &options,
+                &stage,
+                &mut |seen: &Progress<'_>| {
+                    if seen.iteration == 0 {
+                        return ControlFlow::Continue(());
+                    }
+                    observer(start + seen.iteration, seen.energy)?;
+                    let left = 0.5 * seen.gradient_norm * seen.gradient_norm;
+                    settled = newton_like && left <= SETTLED * tolerance * seen.energy.abs();
+                    if settled { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+                },
+            )
         };
         drop(projected);
         self.metric = metric;
@@ -372,7 +380,7 @@ impl Level<'_> {
         let report = report?;
         total.iterations += report.iterations;
         total.evaluations += report.evaluations;
-        total.history.extend(&report.history);
+        total.history.extend(report.history.iter().map(|h| h.energy));
         total.gradient_norm = report.gradient_norm;
         total.status = if settled { Status::Converged } else { report.status };
         Ok((report.initial_energy, report.final_energy, settled))

@@ -8,7 +8,7 @@ use crate::fair::{
 };
 use crate::functional::Energy;
 use geom_core::PolyMesh;
-use gp_solver::{Euclidean, LbfgsOptions, lbfgs};
+use gp_solver::{Euclidean, LbfgsOptions, Progress, Stage, lbfgs};
 use std::ops::ControlFlow;
 use std::time::Instant;
 use subdiv_catmull_clark::{Creases, refine, refinements_needed};
@@ -81,7 +81,8 @@ pub fn fair_in_family(
         &mut Euclidean,
         &mut unknowns,
         &settings,
-        |step| {
+        &Stage::only("family"),
+        &mut |step: &Progress<'_>| {
             let (iteration, energy) = (step.iteration, step.energy);
             observer(&FairProgress { level: 0, levels: 1, vertices, iteration, energy })
         },
@@ -104,7 +105,7 @@ pub fn fair_in_family(
         factor_len: 0,
         initial_energy: solved.initial_energy,
         final_energy: solved.final_energy,
-        history: solved.history,
+        history: solved.history.iter().map(|h| h.energy).collect(),
         seconds: begin.elapsed().as_secs_f64(),
     };
     let report: FairReport = finished(

@@ -1,7 +1,7 @@
 //! Jacobians against central differences, for any block.
 
-use crate::error::SolverError;
-use crate::problem::{EnergyBlock, Quantity, ResidualBlock};
+use crate::block::{EnergyBlock, ResidualBlock};
+use crate::error::{Quantity, SolverError};
 
 /// The entry where a derivative disagrees most with differences.
 #[derive(Clone, Debug, PartialEq)]

@@ -1,6 +1,7 @@
 //! Staying close to given values: the regulariser of guided projection.
 
-use crate::problem::{Elements, ResidualBlock};
+use crate::block::ResidualBlock;
+use crate::elements::Elements;
 
 /// Rows `wᵢ (xᵢ − x⁰ᵢ)`, one for each of the first unknowns, or with `x⁰` the last iterate (Tang et
 /// al. 2014; Pellis et al. 2021, Eq. 11).
@@ -79,5 +80,13 @@ impl ResidualBlock for Closeness {
 
     fn is_linear(&self) -> bool {
         true
+    }
+
+    fn set_reference(&mut self, reference: &[f64]) -> bool {
+        let fits = reference.len() == self.reference.len();
+        if fits {
+            self.reference.copy_from_slice(reference);
+        }
+        fits
     }
 }

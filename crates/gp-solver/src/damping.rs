@@ -31,6 +31,11 @@ const TAKEN_CHANGE: (f64, f64) = (1e-3, 10.0);
 const REFUSED_CHANGE: (f64, f64) = (1.5, 1e3);
 
 impl DampingRule {
+    /// Whether the scaling is the largest diagonal so far.
+    pub(crate) fn keeps_scaling(self) -> bool {
+        self == Self::StepLength
+    }
+
     /// The damping this rule does not go below.
     pub(crate) fn least_damping(self) -> f64 {
         match self {

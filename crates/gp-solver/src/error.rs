@@ -1,6 +1,6 @@
 //! Why a problem cannot be solved as it stands.
 
-use crate::problem::Quantity;
+use std::fmt;
 
 /// What makes it impossible to attempt a solve. Ending early is not an error but a
 /// [`Status`](crate::Status).
@@ -59,10 +59,57 @@ pub enum SolverError {
     /// Out of memory within the sparse factorisation.
     #[error("out of memory while factorising a matrix of size {size}; use a coarser model")]
     OutOfMemory { size: usize },
+    /// A group of unknowns that is not there.
+    #[error("there is no group of unknowns `{name}`; there are: {groups}")]
+    NoSuchGroup { name: String, groups: String },
+    /// A block that is not there, or no longer.
+    #[error(
+        "the problem has no block number {block}; it was removed or belongs to another problem"
+    )]
+    NoSuchBlock { block: usize },
+    /// A block that has no reference to be given anew.
+    #[error("block `{block}` has no reference of {values} values; replace the block")]
+    NoReference { block: String, values: usize },
+    /// A block put in the place of one with other elements.
+    #[error("block `{block}` has other elements than the one it is to replace; add it instead")]
+    OtherElements { block: String },
+    /// A factorisation that is not compiled in.
+    #[error("this problem needs a sparse factorisation; build gp-solver with its feature `sparse`")]
+    NeedsSparse,
+    /// A checkpoint that belongs to something else.
+    #[error("the checkpoint belongs to {what}; resume with the input and options it was made with")]
+    ForeignCheckpoint { what: String },
     /// A checkpoint of another problem or method.
     #[error(
         "the checkpoint does not fit: {what} is {found}, expected {expected}; resume with \
              the problem and options it was written with"
     )]
     CheckpointMismatch { what: &'static str, expected: usize, found: usize },
+}
+
+/// What a block returned.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Quantity {
+    /// A residual.
+    Residual,
+    /// A derivative with respect to the unknown of this number.
+    Derivative(usize),
+    /// An energy.
+    Energy,
+    /// An entry of a gradient.
+    Gradient,
+    /// An entry of a Hessian.
+    Hessian,
+}
+
+impl fmt::Display for Quantity {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Residual => f.write_str("the residual"),
+            Self::Derivative(unknown) => write!(f, "the derivative by unknown {unknown}"),
+            Self::Energy => f.write_str("the energy"),
+            Self::Gradient => f.write_str("the gradient entry"),
+            Self::Hessian => f.write_str("the Hessian row"),
+        }
+    }
 }

@@ -1,13 +1,13 @@
 //! Limited-memory BFGS with a metric.
 
 use std::collections::VecDeque;
-use std::ops::ControlFlow;
-use std::time::Instant;
 
-use crate::error::SolverError;
+use crate::clock::Instant;
+use crate::error::{Quantity, SolverError};
 use crate::line_search::{LineSearch, Outcome};
-use crate::problem::Quantity;
-use crate::report::Status;
+use crate::observer::{Observer, Progress};
+use crate::report::{IterationRecord, Report, Status, Timings};
+use crate::schedule::Stage;
 
 /// A smooth function of many unknowns.
 pub trait Objective {
@@ -75,44 +75,6 @@ impl Default for LbfgsOptions {
     }
 }
 
-/// What an observer of [`lbfgs`] sees after each step (and once at the start).
-#[derive(Clone, Copy, Debug)]
-pub struct LbfgsIteration<'s> {
-    /// Steps taken so far.
-    pub iteration: usize,
-    /// The iterate.
-    pub x: &'s [f64],
-    /// Value there.
-    pub energy: f64,
-    /// `√(gᵀ M⁻¹ g)`.
-    pub gradient_norm: f64,
-    /// Step length as a multiple of the search direction.
-    pub step: f64,
-    /// Evaluations so far.
-    pub evaluations: usize,
-}
-
-/// What [`lbfgs`] did.
-#[derive(Clone, Debug, PartialEq)]
-pub struct LbfgsReport {
-    /// How it ended.
-    pub status: Status,
-    /// Steps taken.
-    pub iterations: usize,
-    /// Value at the start.
-    pub initial_energy: f64,
-    /// Value of the result.
-    pub final_energy: f64,
-    /// `√(gᵀ M⁻¹ g)` at the result.
-    pub gradient_norm: f64,
-    /// Evaluations of value and gradient.
-    pub evaluations: usize,
-    /// Values of all iterates.
-    pub history: Vec<f64>,
-    /// Wall-clock seconds.
-    pub seconds: f64,
-}
-
 /// One remembered step.
 struct Pair {
     s: Vec<f64>,
@@ -124,7 +86,9 @@ struct Pair {
 }
 
 /// Minimises `objective` from `x`, which then holds the result (Nocedal and Wright 2006,
-/// Algorithms 7.4 and 7.5, with `H₀ = γ M⁻¹`, `γ = s·y / (y·M⁻¹y)`).
+/// Algorithms 7.4 and 7.5, with `H₀ = γ M⁻¹`, `γ = s·y / (y·M⁻¹y)`). Norms of the gradient, for
+/// the observer and in the report, are `√(gᵀ M⁻¹ g)`; the history tells each step's length as a
+/// multiple of the search direction.
 ///
 /// # Errors
 /// [`SolverError::NotFinite`] if the value or gradient at the start is not finite.
@@ -133,15 +97,17 @@ pub fn lbfgs(
     metric: &mut (impl Metric + ?Sized),
     x: &mut [f64],
     options: &LbfgsOptions,
-    mut observer: impl FnMut(&LbfgsIteration<'_>) -> ControlFlow<()>,
-) -> Result<LbfgsReport, SolverError> {
+    stage: &Stage,
+    observer: &mut dyn Observer,
+) -> Result<Report, SolverError> {
     let begin = Instant::now();
     let n = x.len();
     let mut gradient = vec![0.0; n];
     let mut energy = objective.value_and_gradient(x, &mut gradient);
     check_start(energy, &gradient)?;
     let mut evaluations = 1;
-    let mut history = vec![energy];
+    let mut history: Vec<f64> = vec![energy];
+    let mut records = Vec::new();
     let mut memory: VecDeque<Pair> = VecDeque::with_capacity(options.memory + 1);
     // M⁻¹ g at the iterate.
     let mut natural = gradient.clone();
@@ -156,8 +122,25 @@ pub fn lbfgs(
     let mut trial_natural = vec![0.0; n];
     let status = loop {
         let iteration = history.len() - 1;
-        let seen = LbfgsIteration { iteration, x, energy, gradient_norm, step, evaluations };
-        if observer(&seen).is_break() {
+        records.push(IterationRecord {
+            energy,
+            terms: Vec::new(),
+            decrease: if iteration == 0 { 0.0 } else { history[iteration - 1] - energy },
+            damping: 0.0,
+            step_norm: step,
+            gradient_norm,
+            factorizations: 0,
+        });
+        let progress = Progress {
+            stage,
+            iteration,
+            max_iterations: options.max_iterations,
+            energy,
+            gradient_norm,
+            x,
+            system: None,
+        };
+        if observer.step(&progress).is_break() || observer.stop_requested() {
             break Status::Interrupted;
         }
         let flat = iteration >= options.window
@@ -222,15 +205,20 @@ pub fn lbfgs(
         gradient_norm = dot(&gradient, &natural).max(0.0).sqrt();
         tracing::debug!(iteration = history.len() - 1, energy, step, gradient = gradient_norm);
     };
-    Ok(LbfgsReport {
+    Ok(Report {
         status,
         iterations: history.len() - 1,
         initial_energy: history[0],
         final_energy: energy,
-        gradient_norm,
+        terms: Vec::new(),
+        history: records,
+        factorizations: 0,
         evaluations,
-        history,
-        seconds: begin.elapsed().as_secs_f64(),
+        gradient_norm,
+        damping: 0.0,
+        variables: n,
+        rows: 0,
+        timings: Timings { total: begin.elapsed(), ..Timings::default() },
     })
 }
 
@@ -295,6 +283,7 @@ fn add_scaled(to: &mut [f64], factor: f64, from: &[f64]) {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use std::ops::ControlFlow;
 
     /// Extended Rosenbrock function of `n` unknowns.
     fn rosenbrock(x: &[f64], g: &mut [f64]) -> f64 {
@@ -308,8 +297,13 @@ mod tests {
         value
     }
 
-    fn go_on(_: &LbfgsIteration<'_>) -> ControlFlow<()> {
-        ControlFlow::Continue(())
+    fn minimise(
+        objective: &mut dyn Objective,
+        metric: &mut dyn Metric,
+        x: &mut [f64],
+        options: &LbfgsOptions,
+    ) -> Report {
+        lbfgs(objective, metric, x, options, &Stage::only("test"), &mut ()).unwrap()
     }
 
     #[test]
@@ -317,7 +311,7 @@ mod tests {
         for line_search in [LineSearch::StrongWolfe { sigma: 0.9 }, LineSearch::Armijo] {
             let mut x: Vec<f64> = (0..100).map(|i| if i % 2 == 0 { -1.2 } else { 1.0 }).collect();
             let options = LbfgsOptions { line_search, ..LbfgsOptions::default() };
-            let report = lbfgs(&mut rosenbrock, &mut Euclidean, &mut x, &options, go_on).unwrap();
+            let report = minimise(&mut rosenbrock, &mut Euclidean, &mut x, &options);
             assert_eq!(report.status, Status::Converged, "{line_search:?}");
             assert!(x.iter().all(|v| (v - 1.0).abs() < 1e-6), "{line_search:?} {report:?}");
             assert!(report.evaluations < 150, "{line_search:?} {}", report.evaluations);
@@ -335,8 +329,7 @@ mod tests {
         };
         let mut metric = |g: &mut [f64]| g.iter_mut().zip(&weights).for_each(|(g, w)| *g /= w);
         let mut x = vec![0.0; 50];
-        let report =
-            lbfgs(&mut quadratic, &mut metric, &mut x, &LbfgsOptions::default(), go_on).unwrap();
+        let report = minimise(&mut quadratic, &mut metric, &mut x, &LbfgsOptions::default());
         assert_eq!(report.status, Status::Converged);
         assert!(report.iterations <= 3, "{report:?}");
     }
@@ -345,22 +338,24 @@ mod tests {
     fn value_never_rises_and_stop_rules_are_reached() {
         let mut x = vec![-1.2, 1.0];
         let few = LbfgsOptions { max_iterations: 3, ..LbfgsOptions::default() };
-        let report = lbfgs(&mut rosenbrock, &mut Euclidean, &mut x, &few, go_on).unwrap();
+        let report = minimise(&mut rosenbrock, &mut Euclidean, &mut x, &few);
         assert_eq!(report.status, Status::IterationLimit);
-        assert!(report.history.windows(2).all(|w| w[1] <= w[0]));
-        let stop = |it: &LbfgsIteration<'_>| {
+        assert!(report.history.windows(2).all(|w| w[1].energy <= w[0].energy));
+        let mut stop = |it: &Progress<'_>| {
             if it.iteration == 2 { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
         };
         let mut x = vec![-1.2, 1.0];
         let all = LbfgsOptions::default();
-        let report = lbfgs(&mut rosenbrock, &mut Euclidean, &mut x, &all, stop).unwrap();
+        let stage = Stage::only("test");
+        let report =
+            lbfgs(&mut rosenbrock, &mut Euclidean, &mut x, &all, &stage, &mut stop).unwrap();
         assert_eq!((report.status, report.iterations), (Status::Interrupted, 2));
         let mut wrong = |_: &[f64], g: &mut [f64]| {
             g[0] = 1.0;
             0.0
         };
         // The gradient lies: no step can lower the value.
-        let report = lbfgs(&mut wrong, &mut Euclidean, &mut [0.0], &all, go_on).unwrap();
+        let report = minimise(&mut wrong, &mut Euclidean, &mut [0.0], &all);
         assert_eq!(report.status, Status::Stalled);
     }
 }

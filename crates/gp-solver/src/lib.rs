@@ -8,7 +8,7 @@
 //! [`BandCholesky`] or [`SparseCholesky`], whichever the structure makes cheaper. Results do not
 //! depend on the number of threads, bit for bit.
 //!
-//! Besides: [`lbfgs`] with a [`Metric`], [`DenseQp`] and [`SparseEqualityQp`],
+//! Besides: [`lbfgs`] with a [`Metric`], [`DenseQp`],
 //! [`MinNormProjection`] onto constraints, and [`check_jacobian`] for a block of one's own.
 //!
 //! # Example
@@ -36,34 +36,53 @@
 //! # Ok::<(), gp_solver::SolverError>(())
 //! ```
 
+mod block;
 mod check;
+mod checkpoint;
+mod clock;
 mod closeness;
 mod damping;
+mod elements;
 mod error;
+mod fields;
 mod lbfgs;
 mod least_squares;
 mod line_search;
 mod linear;
+#[cfg(feature = "sparse")]
 mod min_norm;
+mod observer;
 mod options;
 mod problem;
 mod qp;
 mod quadratic;
 mod report;
+mod schedule;
+mod trust_region;
+mod variables;
 
+pub use block::{EnergyBlock, ResidualBlock};
 pub use check::{DerivativeCheck, check_gradient, check_jacobian};
+pub use checkpoint::{Checkpoint, Fingerprint};
 pub use closeness::Closeness;
 pub use damping::DampingRule;
-pub use error::SolverError;
-pub use lbfgs::{Euclidean, LbfgsIteration, LbfgsOptions, LbfgsReport, Metric, Objective, lbfgs};
-pub use least_squares::{
-    Checkpoint, Iteration, StepModel, System, resume_system, solve, solve_observed, solve_system,
-};
+pub use elements::Elements;
+pub use error::{Quantity, SolverError};
+pub use fields::{Counts, Field, Fields, List, ListItem, OptionValue};
+pub use lbfgs::{Euclidean, LbfgsOptions, Metric, Objective, lbfgs};
+pub use least_squares::{Run, Step, StepModel, System, Triplets, solve, solve_observed};
 pub use line_search::LineSearch;
-pub use linear::{BandCholesky, MultifrontalCholesky, SparseCholesky, SymmetricPattern};
+pub use linear::{BandCholesky, SymmetricPattern};
+#[cfg(feature = "sparse")]
+pub use linear::{MultifrontalCholesky, SparseCholesky};
+#[cfg(feature = "sparse")]
 pub use min_norm::{MinNormProjection, ProjectionOptions, ProjectionReport};
-pub use options::{Factorization, Method, Options};
-pub use problem::{Elements, EnergyBlock, Problem, Quantity, ResidualBlock};
-pub use qp::{DenseQp, QpSolution, SparseEqualityQp};
+pub use observer::{Observer, Progress};
+pub use options::{Factorization, Method, Options, Regularization};
+pub use problem::{BlockId, Problem};
+pub use qp::{DenseQp, QpSolution};
 pub use quadratic::{Equation, QuadraticBuilder, QuadraticConstraints};
 pub use report::{IterationRecord, Report, Status, Term, Timings};
+pub use schedule::{Extra, RunReport, Stage, StageReport};
+pub use trust_region::{Accepted, Attempt, DampedModel, DampingPolicy, Verdict, damped_step};
+pub use variables::{Group, Variables};

@@ -1,8 +1,8 @@
 //! Shortest steps onto constraints.
 
-use crate::error::SolverError;
+use crate::block::ResidualBlock;
+use crate::error::{Quantity, SolverError};
 use crate::linear::{MultifrontalCholesky, SymmetricPattern};
-use crate::problem::{Quantity, ResidualBlock};
 use crate::report::Status;
 
 /// A factorisation serves for another step if the last one left at most this share of `max |C|`.

@@ -17,13 +17,29 @@ pub enum Method {
         /// Weight `ε` of the distance to the last iterate, in units of the unknowns' scale.
         epsilon: f64,
     },
+    /// Gauss-Newton with a fixed regularisation: the full step is halved until the energy does not
+    /// rise, at most to 10⁻⁴ of it ([`Stalled`](crate::Status::Stalled) then).
+    GaussNewton {
+        /// What makes the normal equations regular.
+        regularization: Regularization,
+    },
+}
+
+/// How the normal equations of Gauss-Newton steps are made regular.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Regularization {
+    /// By this share `μ` of their diagonal: `(A + μ D) s = −g`.
+    Diagonal(f64),
+    /// By the square of this weight of the distance to the last iterate, in units of the unknowns'
+    /// scale: `(A + ε² I) s = −g`.
+    Constant(f64),
 }
 
 /// Which factorisation the normal equations get.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Factorization {
-    /// Nested dissection if the problem has [runs](crate::Problem::set_runs), else band or sparse,
+    /// Nested dissection if the problem has [runs](crate::Variables::set_runs), else band or sparse,
     /// whichever the structure makes cheaper.
     #[default]
     Auto,
@@ -32,7 +48,7 @@ pub enum Factorization {
     /// faer's supernodal Cholesky in approximate minimum degree order.
     Sparse,
     /// Our multifrontal Cholesky in nested dissection order; needs
-    /// [runs](crate::Problem::set_runs), else as `Auto`.
+    /// [runs](crate::Variables::set_runs), else as `Auto`.
     Dissection,
 }
 
@@ -105,6 +121,10 @@ impl Options {
         let (name, value) = match self.method {
             Method::LevenbergMarquardt => ("initial_damping", self.initial_damping),
             Method::GuidedProjection { epsilon } => ("epsilon", epsilon),
+            Method::GaussNewton { regularization } => match regularization {
+                Regularization::Diagonal(share) => ("share of the diagonal", share),
+                Regularization::Constant(epsilon) => ("epsilon", epsilon),
+            },
         };
         if !(value > 0.0 && value.is_finite()) {
             return Err(SolverError::BadOption { name, value, need: "positive and finite" });

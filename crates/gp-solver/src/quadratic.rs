@@ -1,6 +1,7 @@
 //! Quadratic constraints from coefficient triplets.
 
-use crate::problem::{Elements, ResidualBlock};
+use crate::block::ResidualBlock;
+use crate::elements::Elements;
 
 /// One product of an equation: `value · x[i] · x[j]`, local column numbers.
 #[derive(Clone, Copy, Debug, PartialEq)]

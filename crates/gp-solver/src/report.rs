@@ -105,6 +105,8 @@ pub struct Report {
     pub history: Vec<IterationRecord>,
     /// Matrix factorisations, refused trials included.
     pub factorizations: usize,
+    /// Evaluations of value and gradient, for methods without factorisations.
+    pub evaluations: usize,
     /// Scaled gradient norm at the last linearisation.
     pub gradient_norm: f64,
     /// Damping after the last step, to go on from.

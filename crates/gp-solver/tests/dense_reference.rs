@@ -155,10 +155,10 @@ proptest! {
                 let mut problem = Problem::new(n);
                 problem.add(block.clone());
                 if held < n {
-                    problem.fix(held);
+                    problem.variables_mut().fix_unknown(held);
                 }
                 if let Some(order) = order {
-                    problem.set_order(order);
+                    problem.variables_mut().set_order(order);
                 }
                 let mut system = System::new(problem, factorization).unwrap();
                 system.linearize(&x).unwrap();
@@ -211,11 +211,11 @@ proptest! {
             let mut problem = Problem::new(n);
             problem.add(block.clone());
             if order {
-                problem.set_order((0..n).rev().collect());
+                problem.variables_mut().set_order((0..n).rev().collect());
             }
             // A fixed unknown leaves the system: names are the caller's all the same.
             if held {
-                problem.fix(rest[0]);
+                problem.variables_mut().fix_unknown(rest[0]);
             }
             let mut system = System::new(problem, factorization).unwrap();
             let x = vec![1.0; n];
@@ -307,7 +307,8 @@ fn problems_of_one_unknown_and_of_none_that_moves() {
         assert!(report.final_energy < 1e-20 && (x[0] - root).abs() < bound, "{root} {x:?}");
     }
     let mut problem = Problem::new(1);
-    problem.add(parabola(3.0)).fix(0);
+    problem.add(parabola(3.0));
+    problem.variables_mut().fix_unknown(0);
     let mut x = [1.0];
     let report = solve(problem, &mut x, &Options::default()).unwrap();
     assert_eq!((report.status, report.iterations, report.variables), (Status::Converged, 0, 0));
@@ -330,7 +331,7 @@ fn sparse_problems_take_the_steps_of_the_dense_block() {
             let mut problem = Problem::new(n);
             problem.add(rows.build());
             if let Some(order) = order {
-                problem.set_order(order);
+                problem.variables_mut().set_order(order);
             }
             let mut x: Vec<f64> = start.iter().copied().cycle().take(n).collect();
             let options = Options { factorization, ..options.clone() };

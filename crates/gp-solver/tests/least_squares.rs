@@ -1,9 +1,9 @@
 //! The solvers on problems with known answers.
 
 use gp_solver::{
-    Checkpoint, Elements, EnergyBlock, Factorization, Iteration, Options, Problem,
-    QuadraticBuilder, ResidualBlock, SolverError, Status, System, check_gradient, check_jacobian,
-    resume_system, solve, solve_observed,
+    Checkpoint, Closeness, Elements, EnergyBlock, Factorization, Observer, Options, Problem,
+    Progress, QuadraticBuilder, ResidualBlock, Run, SolverError, Status, Step, System,
+    check_gradient, check_jacobian, solve, solve_observed,
 };
 use std::ops::ControlFlow;
 
@@ -62,7 +62,8 @@ fn energy_never_rises_over_accepted_steps() {
 #[test]
 fn fixed_unknowns_leave_the_system() {
     let mut problem = Problem::new(2);
-    problem.add(Rosenbrock::new()).fix(0);
+    problem.add(Rosenbrock::new());
+    problem.variables_mut().fix_unknown(0);
     let mut x = [2.0, 0.0];
     let report = solve(problem, &mut x, &Options::default()).unwrap();
     assert_eq!(report.variables, 1);
@@ -76,7 +77,7 @@ fn observer_interrupts_and_leaves_the_iterate_it_was_shown() {
     problem.add(Rosenbrock::new());
     let mut x = [-1.2, 1.0];
     let mut shown = [0.0; 2];
-    let report = solve_observed(problem, &mut x, &Options::default(), |it| {
+    let report = solve_observed(problem, &mut x, &Options::default(), &mut |it: &Progress<'_>| {
         shown.copy_from_slice(it.x);
         if it.iteration == 2 { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
     })
@@ -128,8 +129,8 @@ fn energy_blocks_equal_residual_blocks() {
     let mut a = System::new(by_energy, Factorization::Auto).unwrap();
     let mut b = System::new(by_rows, Factorization::Auto).unwrap();
     assert!((a.linearize(&start).unwrap() - b.linearize(&start).unwrap()).abs() < 1e-14);
-    for (x, y) in a.dense_matrix().iter().zip(b.dense_matrix()) {
-        assert!((x - y).abs() < 1e-14);
+    for (x, y) in a.normal_triplets().iter().zip(b.normal_triplets()) {
+        assert!((x.0, x.1) == (y.0, y.1) && (x.2 - y.2).abs() < 1e-14);
     }
     let (ma, mb) = (a.damped_step(1e-3).unwrap(), b.damped_step(1e-3).unwrap());
     assert!((ma.predicted_decrease - mb.predicted_decrease).abs() < 1e-12);
@@ -211,27 +212,117 @@ fn a_resumed_solve_ends_in_the_same_bits() {
     let mut problem = Problem::new(2);
     problem.add(Rosenbrock::new());
     let mut whole = [-1.2, 1.0];
-    let mut checkpoint = None;
-    let report = solve_observed(problem, &mut whole, &options, |it| {
-        if it.iteration == 5 {
-            checkpoint = Some(it.checkpoint());
-        }
-        ControlFlow::Continue(())
-    })
-    .unwrap();
-    let checkpoint = checkpoint.unwrap();
+    let mut watch = Keeper { keep: 5, kept: None, resume: None };
+    let report = solve_observed(problem, &mut whole, &options, &mut watch).unwrap();
     let mut problem = Problem::new(2);
     problem.add(Rosenbrock::new());
-    let mut system = System::new(problem, Factorization::Auto).unwrap();
     let mut x = [0.0; 2];
-    let go_on = |_: &Iteration<'_>| ControlFlow::Continue(());
-    let resumed = resume_system(&mut system, &checkpoint, &mut x, &options, go_on).unwrap();
+    let mut again = Keeper { keep: usize::MAX, kept: None, resume: watch.kept.clone() };
+    let resumed = solve_observed(problem, &mut x, &options, &mut again).unwrap();
     assert_eq!(x.map(f64::to_bits), whole.map(f64::to_bits));
     assert_eq!(resumed.iterations, report.iterations);
     assert_eq!(resumed.final_energy.to_bits(), report.final_energy.to_bits());
-    let other = Checkpoint { x: vec![0.0; 3], ..checkpoint };
-    let error = resume_system(&mut system, &other, &mut x, &options, go_on).unwrap_err();
-    assert!(error.to_string().starts_with("the checkpoint does not fit: the number of unknowns"));
+    let other = watch.kept.unwrap().with_numbers("x", &[0.0; 3]);
+    let mut problem = Problem::new(2);
+    problem.add(Rosenbrock::new());
+    let mut foreign = Keeper { keep: usize::MAX, kept: None, resume: Some(other) };
+    let error = solve_observed(problem, &mut x, &options, &mut foreign).unwrap_err();
+    assert!(error.to_string().starts_with("the checkpoint belongs to a run of another size"));
+}
+
+/// Keeps the checkpoint after one of the steps, or goes on from one.
+struct Keeper {
+    keep: usize,
+    kept: Option<Checkpoint>,
+    resume: Option<Checkpoint>,
+}
+
+impl Observer for Keeper {
+    fn checkpoint(&mut self, state: &dyn Fn() -> Checkpoint) {
+        let state = state();
+        if state.iteration == self.keep {
+            self.kept = Some(state);
+        }
+    }
+
+    fn resume(&mut self) -> Option<Checkpoint> {
+        self.resume.take()
+    }
+}
+
+#[test]
+fn blocks_change_between_steps_without_a_new_plan() {
+    let wish = |name: &str, at: f64| Closeness::new(name, vec![at; 3], vec![1.0; 3]);
+    let mut problem = Problem::new(3);
+    let (a, b) = (problem.add(wish("a", 1.0)), problem.add(wish("b", 3.0)));
+    let system = System::new(problem, Factorization::Auto).unwrap();
+    let mut run = Run::new(system, &[0.0; 3], &Options::default()).unwrap();
+    let settle = |run: &mut Run<'_>| {
+        run.set_damping(1e-12);
+        while run.step(&mut ()).unwrap() == Step::Taken {}
+        run.x()[0]
+    };
+    let is = |got: f64, want: f64| assert!((got - want).abs() < 1e-9, "{got} {want}");
+    is(settle(&mut run), 2.0);
+    run.system_mut().set_weight(b, 3.0).unwrap(); // (1 + 9·3) / 10
+    is(settle(&mut run), 2.8);
+    run.system_mut().set_reference(a, &[11.0; 3]).unwrap();
+    is(settle(&mut run), 3.8);
+    run.system_mut().replace(b, wish("c", 5.0)).unwrap();
+    is(settle(&mut run), (11.0 + 9.0 * 5.0) / 10.0);
+    run.system_mut().remove(a).unwrap();
+    is(settle(&mut run), 5.0);
+    let c = run.system_mut().add(wish("d", 8.0)).unwrap();
+    is(settle(&mut run), (9.0 * 5.0 + 8.0) / 10.0);
+    assert_eq!(run.report(Status::Converged).terms.len(), 2);
+    // A row that couples what nothing coupled before is planned for.
+    let mut rows = QuadraticBuilder::new("equal");
+    rows.equation(1e4).linear(0, 1.0).linear(2, -1.0);
+    run.system_mut().set_reference(c, &[8.0, 8.0, 20.0]).unwrap();
+    run.system_mut().add(rows.build()).unwrap();
+    settle(&mut run);
+    is(run.x()[0], run.x()[2]);
+    is(run.x()[0] + run.x()[2], 2.0 * 5.3 + 1.2);
+    let gone = run.system_mut().remove(a).unwrap_err();
+    assert_eq!(gone, SolverError::NoSuchBlock { block: 0 });
+    let other = run.system_mut().replace(b, Closeness::new("e", vec![0.0], vec![1.0]));
+    assert!(matches!(other, Err(SolverError::OtherElements { .. })));
+    assert!(matches!(
+        run.system_mut().set_reference(c, &[1.0]),
+        Err(SolverError::NoReference { .. })
+    ));
+}
+
+#[test]
+fn a_block_may_refuse_where_a_step_leads() {
+    /// `x − 3` that must not pass 1.
+    struct Fenced(Elements);
+    impl ResidualBlock for Fenced {
+        fn name(&self) -> &str {
+            "fenced"
+        }
+        fn elements(&self) -> &Elements {
+            &self.0
+        }
+        fn admits(&self, x: &[f64]) -> bool {
+            x[0] <= 1.0
+        }
+        fn residuals(&self, x: &[f64], r: &mut [f64]) {
+            r[0] = x[0] - 3.0;
+        }
+        fn linearize(&self, x: &[f64], r: &mut [f64], j: &mut [f64]) {
+            self.residuals(x, r);
+            j[0] = 1.0;
+        }
+    }
+    let mut elements = Elements::new();
+    elements.push(&[0], 1);
+    let mut problem = Problem::new(1);
+    problem.add(Fenced(elements));
+    let mut x = [0.0];
+    let report = solve(problem, &mut x, &Options::default()).unwrap();
+    assert_eq!(report.status, Status::Stalled);
+    assert!(x[0] <= 1.0 && x[0] > 0.999, "{x:?}");
 }
 
 #[test]
@@ -329,7 +420,7 @@ fn bad_options_and_starts_are_refused_by_name() {
     let message = solve_with(&Options::default(), &mut [0.0; 3]);
     assert!(message.starts_with("the vector of unknowns has 3 values, expected 2"));
     let mut problem = Problem::new(2);
-    problem.set_order(vec![0, 0]);
+    problem.variables_mut().set_order(vec![0, 0]);
     let error = solve(problem, &mut [0.0; 2], &Options::default()).unwrap_err();
     assert!(error.to_string().starts_with("the ordering is no permutation: entry 1 is 0"));
 }

@@ -1,8 +1,8 @@
 //! Every stop rule on a problem made for it, and what is left when a solve ends.
 
 use gp_solver::{
-    Elements, Iteration, Options, Problem, Report, ResidualBlock, SolverError, Status, System,
-    resume_system, solve, solve_observed,
+    Checkpoint, Elements, Options, Problem, Progress, Report, ResidualBlock, Run, SolverError,
+    Stage, Status, Step, System, solve, solve_observed,
 };
 use std::ops::ControlFlow;
 
@@ -145,9 +145,10 @@ fn an_interrupted_iterate_can_be_used_and_continued() {
     for stop in 0..full.iterations {
         let mut problem = Problem::new(1);
         problem.add(root());
-        let (mut x, mut checkpoint) = ([30.0], None);
-        let report = solve_observed(problem, &mut x, &Options::default(), |it| {
-            checkpoint = Some(it.checkpoint());
+        let mut x = [30.0];
+        let report = solve_observed(problem, &mut x, &Options::default(), &mut |it: &Progress<
+            '_,
+        >| {
             if it.iteration == stop { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
         })
         .unwrap();
@@ -158,11 +159,24 @@ fn an_interrupted_iterate_can_be_used_and_continued() {
         assert!(report.history.iter().all(|h| h.energy >= report.final_energy));
         let mut problem = Problem::new(1);
         problem.add(root());
-        let mut system = System::new(problem, gp_solver::Factorization::Auto).unwrap();
-        let go_on = |_: &Iteration<'_>| ControlFlow::Continue(());
-        let checkpoint = checkpoint.unwrap();
-        let resumed =
-            resume_system(&mut system, &checkpoint, &mut x, &Options::default(), go_on).unwrap();
+        let system = System::new(problem, gp_solver::Factorization::Auto).unwrap();
+        let mut run = Run::new(system, &x, &Options::default()).unwrap();
+        // The state that another run saves there.
+        let state = Checkpoint::new("solve", 0, 0, stop);
+        let state = match stop {
+            0 => run.save(state),
+            _ => {
+                let mut problem = Problem::new(1);
+                problem.add(root());
+                let system = System::new(problem, gp_solver::Factorization::Auto).unwrap();
+                let mut other = Run::new(system, &[30.0], &Options::default()).unwrap();
+                (0..stop).for_each(|_| assert_eq!(other.step(&mut ()), Ok(Step::Taken)));
+                other.save(state)
+            }
+        };
+        run.resume(&state).unwrap();
+        let status = run.go_on(&Stage::only("rest"), &mut ()).unwrap();
+        let (resumed, x) = (run.report(status), run.x().to_vec());
         assert_eq!((resumed.status, x[0].to_bits()), (full.status, whole.to_bits()));
     }
 }

@@ -183,7 +183,7 @@ fn problem<'a>(
 ) -> Problem<'a> {
     let vertices = net.positions().len();
     let mut problem = Problem::new(6 * vertices);
-    problem.set_runs(6);
+    problem.variables_mut().set_runs(6);
     problem.add(Weighted { block: constraints.clone(), weight: constraint_weight.clone() });
     let curves = second_differences(net);
     let curves = || curves.iter().map(Vec::as_slice);
@@ -228,10 +228,12 @@ fn problem<'a>(
     for v in 0..vertices {
         if fixed[v] {
             (0..3).for_each(|c| {
-                problem.fix(POSITION.column(v, c));
+                problem.variables_mut().fix_unknown(POSITION.column(v, c));
             });
         }
-        problem.set_scale(6 * v..6 * v + 3, h).set_scale(6 * v + 3..6 * v + 6, size);
+        let variables = problem.variables_mut();
+        variables.set_range_size(6 * v..6 * v + 3, h);
+        variables.set_range_size(6 * v + 3..6 * v + 6, size);
     }
     problem
 }

@@ -178,7 +178,7 @@ fn base_problem<'a>(
 ) -> Problem<'a> {
     let vertices = net.positions().len();
     let mut problem = Problem::new(layout.stride * vertices);
-    problem.set_runs(layout.stride);
+    problem.variables_mut().set_runs(layout.stride);
     match options.planarity {
         StarPlanarity::Quads => {
             let plain = |v| [(v, 1.0), (v, 0.0)];
@@ -220,7 +220,7 @@ fn base_problem<'a>(
     });
     for v in fixed {
         for c in 0..3 {
-            problem.fix(layout.column(v, c));
+            problem.variables_mut().fix_unknown(layout.column(v, c));
         }
     }
     problem

@@ -1,13 +1,10 @@
 //! One level: a net of control points, optimised from a start towards a reference.
 
-use std::ops::ControlFlow;
 use std::sync::Arc;
 
 use bspline::BsplineSurface;
 use geom_core::FirstForm;
-use gp_solver::{
-    Closeness, DampingRule, Iteration, Options, Problem, Report, System, solve_system,
-};
+use gp_solver::{Closeness, DampingRule, Observer, Options, Problem, Report, Run, Stage, System};
 
 use crate::blocks::{
     Alignment, BorderGlide, Fairness, Net, Parallel, RelationRows, Shape, border_points,
@@ -111,7 +108,7 @@ impl Level {
         }
         add_border(&mut problem, options.border, &self.reference, &reference)?;
         problem.add(Closeness::to_last_iterate(x, LAST_ITERATE_WEIGHT));
-        problem.set_order(order(
+        problem.variables_mut().set_order(order(
             net,
             self.reference.degree_u().get(),
             self.reference.degree_v().get(),
@@ -128,10 +125,10 @@ impl Level {
         x: &mut [f64],
         iterations: usize,
         damping: Option<f64>,
-        observer: impl FnMut(&Iteration<'_>) -> ControlFlow<()>,
+        observer: &mut dyn Observer,
     ) -> Result<Report, WeingartenError> {
         let start = regular_samples(&self.grid, origin)?;
-        let mut system =
+        let system =
             System::new(self.problem(options, origin, &start)?, gp_solver::Factorization::Auto)?;
         let rounding =
             ROUNDING_RMS * options.effective_weights().alignment.max(LAST_ITERATE_WEIGHT);
@@ -145,7 +142,10 @@ impl Level {
             abs_energy_tol: 0.5 * self.grid.len() as f64 * rounding * rounding,
             ..defaults
         };
-        Ok(solve_system(&mut system, x, &solver, observer)?)
+        let mut run = Run::new(system, x, &solver)?;
+        let status = run.go_on(&Stage::only(self.name()), observer)?;
+        x.copy_from_slice(run.x());
+        Ok(run.report(status))
     }
 }
 
@@ -171,7 +171,7 @@ pub(crate) fn add_border(
     }
     for control in border_points(net).into_iter().flatten() {
         for axis in 0..3 {
-            problem.fix(3 * control + axis);
+            problem.variables_mut().fix_unknown(3 * control + axis);
         }
     }
     Ok(())

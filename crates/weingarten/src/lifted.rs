@@ -9,12 +9,11 @@
 //! auxiliary `H` and `K` satisfy the alignment long before the surface does. Metrics are therefore
 //! always measured on the surface.
 
-use std::ops::ControlFlow;
 use std::sync::Arc;
 
 use gp_solver::{
-    Closeness, Elements, Iteration, Options, Problem, QuadraticBuilder, QuadraticConstraints,
-    Report, ResidualBlock, solve_observed,
+    Closeness, Elements, Observer, Options, Problem, Progress, QuadraticBuilder,
+    QuadraticConstraints, Report, ResidualBlock, solve_observed,
 };
 use rayon::prelude::*;
 
@@ -56,15 +55,16 @@ pub(crate) fn solve(
     options: &WeingartenOptions,
     x: &mut [f64],
     iterations: usize,
-    mut observer: impl FnMut(&Iteration<'_>) -> ControlFlow<()>,
+    observer: &mut dyn Observer,
 ) -> Result<Report, WeingartenError> {
     let mut lifted = start(&level.grid, x)?;
     let solver =
         Options { max_iterations: iterations, ..Options::guided_projection(LAST_ITERATE_WEIGHT) };
     let control = x.len();
     // The observer sees control points only, as in the other formulation.
-    let report = solve_observed(problem(level, options, &lifted)?, &mut lifted, &solver, |it| {
-        observer(&Iteration { x: &it.x[..control], ..*it })
+    let problem = problem(level, options, &lifted)?;
+    let report = solve_observed(problem, &mut lifted, &solver, &mut |it: &Progress<'_>| {
+        observer.step(&Progress { x: &it.x[..control], ..*it })
     })?;
     x.copy_from_slice(&lifted[..control]);
     Ok(report)
@@ -122,7 +122,7 @@ pub(crate) fn problem(
     }
     add_border(&mut problem, options.border, &level.reference, &reference)?;
     // Control points and the auxiliary variables of a sample both come in threes.
-    problem.set_runs(3);
+    problem.variables_mut().set_runs(3);
     Ok(problem)
 }
 

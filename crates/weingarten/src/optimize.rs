@@ -6,7 +6,7 @@ use std::sync::Arc;
 use bspline::{BsplineSurface, Degree, KnotError, KnotVector};
 use geom_core::BoundingBox;
 use glam::DVec3;
-use gp_solver::{IterationRecord, Report, Status};
+use gp_solver::{Observer, Report, Status};
 
 use crate::checkpoint::{Checkpoint, fingerprint};
 use crate::error::WeingartenError;
@@ -38,8 +38,8 @@ pub struct Progress<'s> {
     pub iteration: usize,
     /// Steps allowed at each level.
     pub iterations: usize,
-    /// Energies of the iterate.
-    pub record: &'s IterationRecord,
+    /// Energy of the iterate.
+    pub energy: f64,
     state: &'s State<'s>,
 }
 
@@ -199,17 +199,19 @@ pub fn optimize_observed(
         };
         let mut x = resumed.map_or_else(|| origin.clone(), |c| c.x.clone());
         let taken = resumed.map_or(0, |c| c.iteration);
-        let mut watch = |iteration: &gp_solver::Iteration<'_>| {
-            let state =
-                State { fingerprint, start: &origin, x: iteration.x, damping: iteration.damping };
-            observer(&Progress {
-                level: number,
-                levels: nets.len(),
-                iteration: taken + iteration.iteration,
-                iterations: options.iterations,
-                record: iteration.record,
-                state: &state,
-            })
+        let mut watch = Watch {
+            damping: 0.0,
+            show: |iteration: &gp_solver::Progress<'_>, damping: f64| {
+                let state = State { fingerprint, start: &origin, x: iteration.x, damping };
+                observer(&Progress {
+                    level: number,
+                    levels: nets.len(),
+                    iteration: taken + iteration.iteration,
+                    iterations: options.iterations,
+                    energy: iteration.energy,
+                    state: &state,
+                })
+            },
         };
         let left = options.iterations.saturating_sub(taken);
         let solver = match options.formulation {
@@ -236,6 +238,22 @@ pub fn optimize_observed(
         return Err(WeingartenError::ForeignCheckpoint { what: "a run with more levels" });
     };
     finish(surface, options, &level, &start_samples, &working, levels)
+}
+
+/// Shows steps with the damping of the state behind them.
+struct Watch<F> {
+    damping: f64,
+    show: F,
+}
+
+impl<F: FnMut(&gp_solver::Progress<'_>, f64) -> ControlFlow<()>> Observer for Watch<F> {
+    fn checkpoint(&mut self, state: &dyn Fn() -> gp_solver::Checkpoint) {
+        self.damping = state().numbers("damping", 1).map_or(0.0, |d| d[0]);
+    }
+
+    fn step(&mut self, progress: &gp_solver::Progress<'_>) -> ControlFlow<()> {
+        (self.show)(progress, self.damping)
+    }
 }
 
 /// Back to the model's units, measured and put together.
@@ -281,7 +299,7 @@ impl Level {
     }
 
     /// The size of the net, for messages.
-    fn name(&self) -> String {
+    pub(crate) fn name(&self) -> String {
         format!("{}x{}", self.reference.n_u(), self.reference.n_v())
     }
 }

@@ -183,7 +183,7 @@ impl<'a> Model<'a> {
         problem.add(Rows(self));
         for (k, fixed) in self.fixed.iter().enumerate() {
             if *fixed {
-                problem.fix(k);
+                problem.variables_mut().fix_unknown(k);
             }
         }
         let options = SolverOptions {

@@ -169,7 +169,7 @@ pub(crate) fn run(
     let mut checkpoint = None;
     let optimized = optimize_observed(surface, options, resume, |progress| {
         let done = progress.level * options.iterations + progress.iteration;
-        bar.at(done, format!("energy {:.3e}", progress.record.energy));
+        bar.at(done, format!("energy {:.3e}", progress.energy));
         checkpoint = Some(progress.checkpoint());
         if context.interrupted() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
     })?;

@@ -62,6 +62,7 @@ mod tests {
             terms: names.iter().map(|n| Term { name: (*n).to_owned(), energy: 0.0 }).collect(),
             history: energies.iter().map(record).collect(),
             factorizations: 0,
+            evaluations: 0,
             gradient_norm: 0.0,
             damping: 0.0,
             variables: 1,

@@ -1,9 +1,12 @@
-//! Nonlinear least squares: Levenberg-Marquardt and guided projection.
+//! Nonlinear least squares: Levenberg-Marquardt, guided projection, Gauss-Newton.
 
 mod gram;
+mod inspect;
+mod levenberg;
 mod normal;
-mod solve;
+mod run;
 mod system;
 
-pub use solve::{Checkpoint, Iteration, resume_system, solve, solve_observed, solve_system};
+pub use inspect::Triplets;
+pub use run::{Run, Step, solve, solve_observed};
 pub use system::{StepModel, System};

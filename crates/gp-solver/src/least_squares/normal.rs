@@ -3,10 +3,11 @@
 use std::ops::Range;
 
 use super::gram::{AddGram, Run, Targets};
+use crate::elements::Elements;
 use crate::error::SolverError;
 use crate::linear::{Factor, Storage};
 use crate::options::Factorization;
-use crate::problem::{Block, Elements, Problem};
+use crate::problem::Problem;
 
 /// Mark of a fixed unknown.
 const FIXED: u32 = u32::MAX;
@@ -143,7 +144,7 @@ impl BlockPlan {
     }
 
     /// Looks up where the products go in compressed columns.
-    fn plan_targets(&mut self, slot: impl Fn(usize, usize) -> usize) {
+    fn plan_targets(&mut self, mut slot: impl FnMut(usize, usize) -> usize) {
         self.target_starts = vec![0];
         for e in 0..self.len() {
             let positions = &self.position[self.range(e)];
@@ -159,28 +160,37 @@ impl BlockPlan {
     }
 }
 
+/// Position of every unknown.
+fn positions(variable: &[usize], unknowns: usize) -> Vec<u32> {
+    let mut position = vec![FIXED; unknowns];
+    for (k, &i) in variable.iter().enumerate() {
+        position[i] = k as u32;
+    }
+    position
+}
+
 impl NormalPlan {
     /// Plans the normal equations of a problem and chooses their factorisation.
     pub(crate) fn new(
         problem: &Problem<'_>,
         wanted: Factorization,
     ) -> Result<(Self, Factor), SolverError> {
-        let natural: Vec<usize> = match &problem.order {
-            Some(order) => order.iter().copied().filter(|&i| !problem.fixed[i]).collect(),
-            None => (0..problem.unknowns).filter(|&i| !problem.fixed[i]).collect(),
+        let (variables, unknowns) = (problem.variables(), problem.unknowns());
+        let is_free = |i: &usize| !variables.fixed()[*i];
+        let natural: Vec<usize> = match variables.order() {
+            Some(order) => order.iter().copied().filter(is_free).collect(),
+            None => (0..unknowns).filter(is_free).collect(),
         };
         let blocks_at = |variable: &[usize]| -> Vec<BlockPlan> {
-            let mut position = vec![FIXED; problem.unknowns];
-            for (k, &i) in variable.iter().enumerate() {
-                position[i] = k as u32;
-            }
-            problem.blocks.iter().map(|b| BlockPlan::new(b.elements(), &position)).collect()
+            let position = positions(variable, unknowns);
+            let elements = problem.slots.iter().map(|slot| slot.block.elements());
+            elements.map(|elements| BlockPlan::new(elements, &position)).collect()
         };
         let mut variable = natural;
         let mut blocks = blocks_at(&variable);
         let cliques = blocks.iter().flat_map(|b| (0..b.len()).map(|e| b.positions(e)));
         // Fixed unknowns leave gaps in the numbers of the runs, which does no harm.
-        let together: Option<Vec<usize>> = match (&problem.order, problem.run) {
+        let together: Option<Vec<usize>> = match (variables.order(), variables.runs()) {
             (None, Some(run)) => Some(variable.iter().map(|i| i / run).collect()),
             _ => None,
         };
@@ -204,6 +214,51 @@ impl NormalPlan {
             }
         };
         Ok((Self { variable, blocks, stride }, factor))
+    }
+
+    /// Plans one more block in the pattern there is; `false`, and nothing is changed, if it couples
+    /// unknowns that the pattern does not.
+    pub(crate) fn try_add(
+        &mut self,
+        elements: &Elements,
+        unknowns: usize,
+        factor: &Factor,
+    ) -> bool {
+        let mut plan = BlockPlan::new(elements, &positions(&self.variable, unknowns));
+        let mut fits = true;
+        match factor.storage() {
+            Storage::Band { .. } => {
+                let reach = factor.half_bandwidth();
+                let span = |p: &[u32]| p.last().zip(p.first()).map_or(0, |(b, a)| (b - a) as usize);
+                fits = (0..plan.len()).all(|e| span(plan.positions(e)) <= reach);
+            }
+            Storage::Columns(pattern) => {
+                plan.plan_targets(|i, j| {
+                    pattern.slot(i, j).unwrap_or_else(|| {
+                        fits = false;
+                        0
+                    })
+                });
+                // A run is scattered from its first entry on, so that all of it has to be there.
+                fits &= (0..plan.len()).all(|e| {
+                    let p = plan.positions(e);
+                    p.iter().enumerate().all(|(b, &column)| {
+                        p[b..]
+                            .iter()
+                            .all(|&row| pattern.slot(row as usize, column as usize).is_some())
+                    })
+                });
+            }
+        }
+        if fits {
+            self.blocks.push(plan);
+        }
+        fits
+    }
+
+    /// Forgets a block that was taken out.
+    pub(crate) fn clear(&mut self, block: usize) {
+        self.blocks[block] = BlockPlan::new(&Elements::none(), &[]);
     }
 
     /// Number of free unknowns.
@@ -340,9 +395,4 @@ impl NormalPlan {
             })
         })
     }
-}
-
-/// Whether a block's matrix part is the same at every iterate.
-pub(crate) fn is_constant(block: &Block<'_>) -> bool {
-    matches!(block, Block::Residual(rows) if rows.is_linear())
 }

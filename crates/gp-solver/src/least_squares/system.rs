@@ -1,15 +1,15 @@
 //! A problem linearised at an iterate, and single steps from it.
 
-use std::time::Instant;
-
-use super::normal::{NormalPlan, Scratch, is_constant};
-use crate::error::SolverError;
-use crate::linear::{Factor, SymmetricPattern};
+use super::normal::{NormalPlan, Scratch};
+use crate::block::{Block, ResidualBlock};
+use crate::clock::Instant;
+use crate::error::{Quantity, SolverError};
+use crate::linear::Factor;
 use crate::options::Factorization;
-use crate::problem::{Block, Problem, Quantity};
+use crate::problem::{BlockId, Problem, Seen, Slot};
 use crate::report::{Term, Timings};
 
-/// Residuals and derivatives of one block.
+/// Residuals and derivatives of one block, weights included.
 #[derive(Default)]
 struct BlockValues {
     residuals: Vec<f64>,
@@ -24,6 +24,7 @@ struct BlockValues {
 /// This is what the solvers stand on; it is public for callers that drive their own iteration.
 pub struct System<'a> {
     problem: Problem<'a>,
+    wanted: Factorization,
     plan: NormalPlan,
     factor: Factor,
     values: Vec<BlockValues>,
@@ -63,6 +64,16 @@ impl StepModel {
     }
 }
 
+impl BlockValues {
+    fn for_block(block: &Block<'_>) -> Self {
+        Self {
+            residuals: vec![0.0; block.elements().rows_total()],
+            derivatives: vec![0.0; block.elements().jacobian_len()],
+            linearized: false,
+        }
+    }
+}
+
 impl<'a> System<'a> {
     /// Checks and plans a problem.
     ///
@@ -72,17 +83,10 @@ impl<'a> System<'a> {
         let begin = Instant::now();
         problem.check()?;
         let (plan, factor) = NormalPlan::new(&problem, factorization)?;
-        let values = problem
-            .blocks
-            .iter()
-            .map(|block| BlockValues {
-                residuals: vec![0.0; block.elements().rows_total()],
-                derivatives: vec![0.0; block.elements().jacobian_len()],
-                linearized: false,
-            })
-            .collect();
+        let values = problem.slots.iter().map(|s| BlockValues::for_block(&s.block)).collect();
         let n = plan.size();
         Ok(Self {
+            wanted: factorization,
             values,
             constant: Vec::new(),
             matrix: vec![0.0; factor.values_len()],
@@ -90,8 +94,8 @@ impl<'a> System<'a> {
             diagonal: vec![0.0; n],
             scaling: vec![0.0; n],
             keeps_scaling: false,
-            terms: vec![0.0; problem.blocks.len()],
-            trial: vec![0.0; problem.blocks.len()],
+            terms: vec![0.0; problem.slots.len()],
+            trial: vec![0.0; problem.slots.len()],
             shift: vec![0.0; n],
             step: vec![0.0; n],
             scratch: Scratch::default(),
@@ -110,6 +114,92 @@ impl<'a> System<'a> {
         &self.problem
     }
 
+    /// Takes up one more block. Its rows join the pattern there is; only if they couple unknowns
+    /// that the pattern does not is the problem planned anew.
+    ///
+    /// # Errors
+    /// What [`SolverError`] says of malformed blocks.
+    pub fn add(&mut self, block: impl ResidualBlock + 'a) -> Result<BlockId, SolverError> {
+        let block = Block::Residual(Box::new(block));
+        Seen::new(self.problem.unknowns()).check(&block)?;
+        let begin = Instant::now();
+        let fits = self.plan.try_add(block.elements(), self.problem.unknowns(), &self.factor);
+        self.values.push(BlockValues::for_block(&block));
+        self.terms.push(0.0);
+        self.trial.push(0.0);
+        let id = self.problem.push(block);
+        if !fits {
+            (self.plan, self.factor) = NormalPlan::new(&self.problem, self.wanted)?;
+            self.matrix = vec![0.0; self.factor.values_len()];
+            self.forget_constant();
+        }
+        self.timings.plan += begin.elapsed();
+        Ok(id)
+    }
+
+    /// Takes a block out; pattern and order stay.
+    ///
+    /// # Errors
+    /// [`SolverError::NoSuchBlock`].
+    pub fn remove(&mut self, block: BlockId) -> Result<(), SolverError> {
+        let is_constant = self.problem.slot(block)?.block.is_constant();
+        self.problem.remove(block)?;
+        self.plan.clear(block.0);
+        self.values[block.0] = BlockValues::default();
+        self.terms[block.0] = 0.0;
+        if is_constant {
+            self.forget_constant();
+        }
+        Ok(())
+    }
+
+    /// Puts a block of equal elements in the place of another.
+    ///
+    /// # Errors
+    /// [`SolverError::NoSuchBlock`], [`SolverError::OtherElements`].
+    pub fn replace(
+        &mut self,
+        block: BlockId,
+        by: impl ResidualBlock + 'a,
+    ) -> Result<(), SolverError> {
+        let slot = self.problem.slot(block)?;
+        if slot.block.elements() != by.elements() {
+            return Err(SolverError::OtherElements { block: by.name().to_owned() });
+        }
+        let was_constant = slot.block.is_constant();
+        slot.block = Block::Residual(Box::new(by));
+        if was_constant || slot.block.is_constant() {
+            self.forget_constant();
+        }
+        Ok(())
+    }
+
+    /// Weighs a block, as [`Problem::set_weight`].
+    ///
+    /// # Errors
+    /// As there.
+    pub fn set_weight(&mut self, block: BlockId, weight: f64) -> Result<(), SolverError> {
+        let before = self.problem.weight(block)?;
+        self.problem.set_weight(block, weight)?;
+        if before != weight && self.problem.slot(block)?.block.is_constant() {
+            self.forget_constant();
+        }
+        Ok(())
+    }
+
+    /// Gives a block new values to measure against, as [`Problem::set_reference`].
+    ///
+    /// # Errors
+    /// As there.
+    pub fn set_reference(&mut self, block: BlockId, reference: &[f64]) -> Result<(), SolverError> {
+        self.problem.set_reference(block, reference)
+    }
+
+    /// The matrix part of the linear blocks is formed again at the next linearisation.
+    fn forget_constant(&mut self) {
+        self.values.iter_mut().for_each(|values| values.linearized = false);
+    }
+
     /// Gives the problem back.
     #[must_use]
     pub fn into_problem(self) -> Problem<'a> {
@@ -125,11 +215,11 @@ impl<'a> System<'a> {
     /// Number of residual rows.
     #[must_use]
     pub fn rows(&self) -> usize {
-        let rows = |(block, values): (&Block<'_>, &BlockValues)| match block {
+        let rows = |(slot, values): (&Slot<'_>, &BlockValues)| match slot.block {
             Block::Residual(_) => values.residuals.len(),
-            Block::Energy(_) => 0,
+            Block::Energy(_) | Block::Removed => 0,
         };
-        self.problem.blocks.iter().zip(&self.values).map(rows).sum()
+        self.problem.slots.iter().zip(&self.values).map(rows).sum()
     }
 
     /// The factorisation in use: `band`, `sparse` or `dissection`.
@@ -201,18 +291,20 @@ impl<'a> System<'a> {
     /// Energies of the blocks at the last linearisation.
     #[must_use]
     pub fn terms(&self) -> Vec<Term> {
-        let term = |(b, &energy): (&Block<'_>, &f64)| Term { name: b.name().to_owned(), energy };
-        self.problem.blocks.iter().zip(&self.terms).map(term).collect()
+        let term =
+            |(id, name): (BlockId, &str)| Term { name: name.to_owned(), energy: self.terms[id.0] };
+        self.problem.blocks().map(term).collect()
     }
 
-    pub(crate) fn term_energies(&self) -> &[f64] {
-        &self.terms
+    /// Energies of the blocks at the last linearisation, in their order.
+    pub(crate) fn term_energies(&self) -> Vec<f64> {
+        self.problem.blocks().map(|(id, _)| self.terms[id.0]).collect()
     }
 
     /// Lets the blocks update their lagged quantities.
     pub fn refresh(&mut self, x: &[f64]) {
-        for block in &mut self.problem.blocks {
-            block.refresh(x);
+        for slot in &mut self.problem.slots {
+            slot.block.refresh(x);
         }
     }
 
@@ -223,20 +315,28 @@ impl<'a> System<'a> {
     pub fn linearize(&mut self, x: &[f64]) -> Result<f64, SolverError> {
         self.check_length(x)?;
         let begin = Instant::now();
-        for (b, block) in self.problem.blocks.iter().enumerate() {
+        for (b, Slot { block, weight }) in self.problem.slots.iter().enumerate() {
             let values = &mut self.values[b];
             self.terms[b] = match block {
                 Block::Residual(rows) => {
                     if values.linearized && rows.is_linear() {
                         rows.residuals(x, &mut values.residuals);
+                        weigh(&mut values.residuals, *weight);
                     } else {
                         rows.linearize(x, &mut values.residuals, &mut values.derivatives);
+                        weigh(&mut values.residuals, *weight);
+                        weigh(&mut values.derivatives, *weight);
                     }
                     half_square(&values.residuals)
                 }
                 Block::Energy(energy) => {
-                    energy.quadratic_model(x, &mut values.residuals, &mut values.derivatives)
+                    let value =
+                        energy.quadratic_model(x, &mut values.residuals, &mut values.derivatives);
+                    weigh(&mut values.residuals, *weight);
+                    weigh(&mut values.derivatives, *weight);
+                    weight * value
                 }
+                Block::Removed => 0.0,
             };
             check_finite(block, values, self.terms[b])?;
         }
@@ -253,8 +353,8 @@ impl<'a> System<'a> {
         self.matrix.fill(0.0);
         // Zero rows are not worth a thought: the gradient is formed with the rest.
         let mut unused = vec![0.0; self.plan.size()];
-        for (b, block) in self.problem.blocks.iter().enumerate() {
-            if is_constant(block) {
+        for (b, Slot { block, .. }) in self.problem.slots.iter().enumerate() {
+            if block.is_constant() {
                 let values = &mut self.values[b];
                 self.plan.add_rows(
                     b,
@@ -273,9 +373,10 @@ impl<'a> System<'a> {
     }
 
     fn form(&mut self) {
-        let is_new =
-            |(block, values): (&Block<'_>, &BlockValues)| is_constant(block) && !values.linearized;
-        if self.problem.blocks.iter().zip(&self.values).any(is_new) {
+        let is_new = |(slot, values): (&Slot<'_>, &BlockValues)| {
+            slot.block.is_constant() && !values.linearized
+        };
+        if self.problem.slots.iter().zip(&self.values).any(is_new) {
             self.form_constant();
         }
         self.matrix.fill(0.0);
@@ -283,9 +384,10 @@ impl<'a> System<'a> {
             self.matrix[slot as usize] = value;
         }
         self.gradient.fill(0.0);
-        for (b, block) in self.problem.blocks.iter().enumerate() {
+        for (b, Slot { block, .. }) in self.problem.slots.iter().enumerate() {
             let values = &self.values[b];
             match block {
+                Block::Removed => {}
                 Block::Residual(_) => self.plan.add_rows(
                     b,
                     block.elements(),
@@ -308,7 +410,7 @@ impl<'a> System<'a> {
         }
         for i in 0..self.plan.size() {
             let a = self.matrix[self.factor.diagonal_slot(i)];
-            let size = self.problem.scale[self.plan.variable[i]];
+            let size = self.problem.variables.sizes()[self.plan.variable[i]];
             // Exact Hessians of energies can have negative diagonals.
             self.diagonal[i] = if a != 0.0 { a.abs() } else { 1.0 / (size * size) };
             let least = if self.keeps_scaling { self.scaling[i] } else { 0.0 };
@@ -316,18 +418,24 @@ impl<'a> System<'a> {
         }
     }
 
-    /// The energy at `x`, infinite or NaN where a block is; leaves the linearisation alone.
+    /// The energy at `x`: infinite where a block does not admit `x`, and infinite or NaN where a
+    /// block is; leaves the linearisation alone.
     pub fn energy_at(&mut self, x: &[f64]) -> f64 {
         let begin = Instant::now();
-        for (b, block) in self.problem.blocks.iter().enumerate() {
+        if !self.problem.slots.iter().all(|slot| slot.block.admits(x)) {
+            return f64::INFINITY;
+        }
+        for (b, Slot { block, weight }) in self.problem.slots.iter().enumerate() {
             self.trial[b] = match block {
                 Block::Residual(rows) => {
                     // The linearisation has used the residuals up, so their memory is free.
                     let residuals = &mut self.values[b].residuals;
                     rows.residuals(x, residuals);
+                    weigh(residuals, *weight);
                     half_square(residuals)
                 }
-                Block::Energy(energy) => energy.energy(x),
+                Block::Energy(energy) => weight * energy.energy(x),
+                Block::Removed => 0.0,
             };
         }
         self.timings.residuals += begin.elapsed();
@@ -373,7 +481,7 @@ impl<'a> System<'a> {
     /// [`SolverError::NotPositiveDefinite`] names the unknown.
     pub fn projection_step(&mut self, epsilon: f64) -> Result<StepModel, SolverError> {
         for (s, &i) in self.shift.iter_mut().zip(&self.plan.variable) {
-            *s = (epsilon / self.problem.scale[i]).powi(2);
+            *s = (epsilon / self.problem.variables.sizes()[i]).powi(2);
         }
         self.shifted_step()
     }
@@ -437,59 +545,43 @@ impl<'a> System<'a> {
         self.gradient.iter().zip(&self.diagonal).map(cosine).fold(0.0, f64::max)
     }
 
-    /// The normal matrix at the last linearisation, dense and by position (for tests and small
-    /// problems): `out[i * n + j]`.
-    #[must_use]
-    pub fn dense_matrix(&self) -> Vec<f64> {
-        let n = self.plan.size();
-        let mut out = vec![0.0; n * n];
-        let mut put = |i: usize, j: usize, value: f64| {
-            out[i * n + j] = value;
-            out[j * n + i] = value;
-        };
-        let mut columns = |pattern: &SymmetricPattern| {
-            for j in 0..n {
-                for k in pattern.column_starts()[j]..pattern.column_starts()[j + 1] {
-                    put(pattern.rows()[k] as usize, j, self.matrix[k]);
-                }
-            }
-        };
-        match &self.factor {
-            Factor::Band(band) => {
-                for j in 0..n {
-                    for i in j..n.min(j + band.half_bandwidth() + 1) {
-                        put(i, j, self.matrix[band.slot(i, j)]);
-                    }
-                }
-            }
-            Factor::Sparse { cholesky, .. } => columns(cholesky.pattern()),
-            Factor::Dissected { cholesky, .. } => columns(cholesky.pattern()),
-        }
-        out
+    pub(super) fn plan(&self) -> &NormalPlan {
+        &self.plan
     }
 
-    /// The Jacobian of all residual rows at the last linearisation, columns by position.
-    #[must_use]
-    pub fn jacobian(&self) -> sprs::CsMat<f64> {
-        let mut triplets = sprs::TriMat::new((self.rows(), self.variables()));
-        let mut first = 0;
-        for (b, block) in self.problem.blocks.iter().enumerate() {
-            let Block::Residual(rows) = block else { continue };
-            let elements = rows.elements();
-            for (i, j, value) in self.plan.triplets(b, elements, &self.values[b].derivatives) {
-                triplets.add_triplet(first + i, j, value);
-            }
-            first += elements.rows_total();
-        }
-        triplets.to_csc()
+    pub(super) fn factor(&self) -> &Factor {
+        &self.factor
+    }
+
+    /// Values of the normal matrix, laid out as the factorisation wants them.
+    pub(super) fn matrix(&self) -> &[f64] {
+        &self.matrix
+    }
+
+    /// Residuals of a block where it was last evaluated.
+    #[cfg(feature = "sparse")]
+    pub(super) fn residuals_of(&self, block: usize) -> &[f64] {
+        &self.values[block].residuals
+    }
+
+    /// Jacobian values (or Hessians) of a block at the last linearisation.
+    pub(super) fn derivatives(&self, block: usize) -> &[f64] {
+        &self.values[block].derivatives
     }
 
     fn check_length(&self, x: &[f64]) -> Result<(), SolverError> {
-        if x.len() == self.problem.unknowns {
+        if x.len() == self.problem.unknowns() {
             return Ok(());
         }
-        let (expected, found) = (self.problem.unknowns, x.len());
+        let (expected, found) = (self.problem.unknowns(), x.len());
         Err(SolverError::WrongLength { what: "the vector of unknowns", expected, found })
+    }
+}
+
+/// `values · weight`, to the bit the same where the weight is 1.
+fn weigh(values: &mut [f64], weight: f64) {
+    if weight != 1.0 {
+        values.iter_mut().for_each(|value| *value *= weight);
     }
 }
 

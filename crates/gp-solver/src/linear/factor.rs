@@ -1,7 +1,9 @@
 //! One interface to the three factorisations, and the choice between them.
 
 use super::ordering::{half_bandwidth, reverse_cuthill_mckee};
-use super::{BandCholesky, MultifrontalCholesky, SparseCholesky, SymmetricPattern};
+use super::{BandCholesky, SymmetricPattern};
+#[cfg(feature = "sparse")]
+use super::{MultifrontalCholesky, SparseCholesky};
 use crate::error::SolverError;
 use crate::options::Factorization;
 
@@ -20,8 +22,16 @@ const SMALL: usize = 64;
 /// A factorisation that fits the structure.
 pub(crate) enum Factor {
     Band(BandCholesky),
-    Sparse { cholesky: Box<SparseCholesky>, shifted: Vec<f64> },
-    Dissected { cholesky: Box<MultifrontalCholesky>, shifted: Vec<f64> },
+    #[cfg(feature = "sparse")]
+    Sparse {
+        cholesky: Box<SparseCholesky>,
+        shifted: Vec<f64>,
+    },
+    #[cfg(feature = "sparse")]
+    Dissected {
+        cholesky: Box<MultifrontalCholesky>,
+        shifted: Vec<f64>,
+    },
 }
 
 /// Where the values of the normal matrix stand.
@@ -41,6 +51,7 @@ impl Factor {
         together: Option<&[usize]>,
         wanted: Factorization,
     ) -> Result<(Self, Option<Vec<usize>>), SolverError> {
+        #[cfg(feature = "sparse")]
         if let Some(together) = together
             && (wanted == Factorization::Dissection
                 || wanted == Factorization::Auto && size > SMALL)
@@ -76,6 +87,32 @@ impl Factor {
         if wanted == Factorization::Band {
             return Ok((Self::Band(BandCholesky::new(size, band.0)), band.1));
         }
+        Self::sparse_or_band(pattern, band, &seconds, wanted)
+    }
+
+    /// Without a sparse factorisation there is the band, whatever it costs.
+    #[cfg(not(feature = "sparse"))]
+    fn sparse_or_band(
+        pattern: SymmetricPattern,
+        band: (usize, Option<Vec<usize>>),
+        _seconds: &dyn Fn(usize) -> f64,
+        wanted: Factorization,
+    ) -> Result<(Self, Option<Vec<usize>>), SolverError> {
+        if wanted == Factorization::Sparse {
+            return Err(SolverError::NeedsSparse);
+        }
+        Ok((Self::Band(BandCholesky::new(pattern.size(), band.0)), band.1))
+    }
+
+    /// The cheaper of the band and the sparse factorisation.
+    #[cfg(feature = "sparse")]
+    fn sparse_or_band(
+        pattern: SymmetricPattern,
+        band: (usize, Option<Vec<usize>>),
+        seconds: &dyn Fn(usize) -> f64,
+        wanted: Factorization,
+    ) -> Result<(Self, Option<Vec<usize>>), SolverError> {
+        let size = pattern.size();
         let cholesky = Box::new(SparseCholesky::new(pattern)?);
         let sparse_seconds =
             cholesky.flops() / SPARSE_SPEED + cholesky.factor_len() as f64 * SPARSE_OVERHEAD;
@@ -88,15 +125,27 @@ impl Factor {
     pub(crate) fn storage(&self) -> Storage<'_> {
         match self {
             Self::Band(band) => Storage::Band { stride: band.slot(0, 1) },
+            #[cfg(feature = "sparse")]
             Self::Sparse { cholesky, .. } => Storage::Columns(cholesky.pattern()),
+            #[cfg(feature = "sparse")]
             Self::Dissected { cholesky, .. } => Storage::Columns(cholesky.pattern()),
+        }
+    }
+
+    /// The half bandwidth, of a band; else that of a full matrix.
+    pub(crate) fn half_bandwidth(&self) -> usize {
+        match self {
+            Self::Band(band) => band.half_bandwidth(),
+            _ => usize::MAX,
         }
     }
 
     pub(crate) fn values_len(&self) -> usize {
         match self {
             Self::Band(band) => band.values_len(),
+            #[cfg(feature = "sparse")]
             Self::Sparse { cholesky, .. } => cholesky.pattern().len(),
+            #[cfg(feature = "sparse")]
             Self::Dissected { cholesky, .. } => cholesky.pattern().len(),
         }
     }
@@ -105,7 +154,9 @@ impl Factor {
     pub(crate) fn diagonal_slot(&self, i: usize) -> usize {
         match self {
             Self::Band(band) => band.slot(i, i),
+            #[cfg(feature = "sparse")]
             Self::Sparse { cholesky, .. } => cholesky.pattern().column_starts()[i],
+            #[cfg(feature = "sparse")]
             Self::Dissected { cholesky, .. } => cholesky.pattern().column_starts()[i],
         }
     }
@@ -114,10 +165,12 @@ impl Factor {
     pub(crate) fn factor(&mut self, values: &[f64], shift: &[f64]) -> Result<(), SolverError> {
         match self {
             Self::Band(band) => band.factor(values, shift),
+            #[cfg(feature = "sparse")]
             Self::Sparse { cholesky, shifted } => {
                 add_to_diagonal(cholesky.pattern(), values, shift, shifted);
                 cholesky.factor(shifted)
             }
+            #[cfg(feature = "sparse")]
             Self::Dissected { cholesky, shifted } => {
                 add_to_diagonal(cholesky.pattern(), values, shift, shifted);
                 cholesky.factor(shifted)
@@ -128,7 +181,9 @@ impl Factor {
     pub(crate) fn solve_in_place(&self, rhs: &mut [f64]) {
         match self {
             Self::Band(band) => band.solve_in_place(rhs),
+            #[cfg(feature = "sparse")]
             Self::Sparse { cholesky, .. } => cholesky.solve_in_place(rhs),
+            #[cfg(feature = "sparse")]
             Self::Dissected { cholesky, .. } => cholesky.solve_in_place(rhs),
         }
     }
@@ -136,13 +191,16 @@ impl Factor {
     pub(crate) fn name(&self) -> &'static str {
         match self {
             Self::Band(_) => "band",
+            #[cfg(feature = "sparse")]
             Self::Sparse { .. } => "sparse",
+            #[cfg(feature = "sparse")]
             Self::Dissected { .. } => "dissection",
         }
     }
 }
 
 /// `shifted = A + diag(shift)`.
+#[cfg(feature = "sparse")]
 fn add_to_diagonal(
     pattern: &SymmetricPattern,
     values: &[f64],

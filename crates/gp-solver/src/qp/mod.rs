@@ -1,10 +1,8 @@
 //! Convex quadratic programs.
 
 mod dense;
-mod sparse;
 
 pub use dense::DenseQp;
-pub use sparse::SparseEqualityQp;
 
 use crate::report::Status;
 

@@ -129,7 +129,8 @@ impl Lifted {
             data.equation(1.0).linear(self.fitted(i), 1.0).constant(-row[0]);
         }
         let mut problem = Problem::new(self.unknowns());
-        problem.add(data.build()).add(constraints);
+        problem.add(data.build());
+        problem.add(constraints);
         let report = solve(problem, &mut x, &Options::default());
         b.copy_from_slice(&x[..b.len()]);
         report
