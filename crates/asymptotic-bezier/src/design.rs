@@ -1,11 +1,14 @@
 //! From input to measured result in one call: what the command line runs.
 
+use crate::boundary::options::BoundaryOptions;
 use crate::boundary::quad::{Quadrilateral, doubt_signs, solve_quadrilateral};
 use crate::boundary::quartic::solve_quartic_quadrilateral;
-use crate::boundary::solve::{Boundary, BoundaryOptions, solve_boundary};
+use crate::boundary::solve::solve_boundary;
+use crate::boundary::solved::Boundary;
 use crate::data::corners::{AsymptoticNet, CURVE_CORNERS, CornerData};
 use crate::error::{AsymptoticError, Place};
-use crate::patch::family::{PatchOptions, fill_patch};
+use crate::patch::options::PatchOptions;
+use crate::patch::solve::fill_patch;
 use crate::relax::relaxed::{RelaxOptions, Relaxed, relax, relax_patch};
 use crate::shell::gridshell::{Gridshell, GridshellCheck, fill_solved};
 use crate::shell::joint::Joins;

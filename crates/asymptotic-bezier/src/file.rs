@@ -5,9 +5,9 @@ use std::collections::BTreeMap;
 use geom_core::DVec3;
 use serde::{Deserialize, Serialize};
 
-use crate::boundary::solve::{TorsionHandle, arm_signs, bilinear_torsions};
+use crate::boundary::options::TorsionHandle;
 use crate::data::corners::{AsymptoticNet, CornerData, Curvatures, NetCurve};
-use crate::data::vertex::vertex_frames;
+use crate::data::vertex::{arm_signs, bilinear_torsions, vertex_frames};
 use crate::design::Input;
 use crate::error::AsymptoticError;
 

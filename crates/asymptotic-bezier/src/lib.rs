@@ -38,22 +38,24 @@ mod patch;
 mod relax;
 mod shell;
 
+pub use boundary::four_curves::PatchBoundary;
+pub use boundary::options::{
+    BOUNDARY_DEGREES, BoundaryEnergy, BoundaryOptions, CurveForm, TorsionHandle,
+};
 pub use boundary::quad::{Quadrilateral, doubt_signs, solve_quadrilateral};
 pub use boundary::quartic::solve_quartic_quadrilateral;
-pub use boundary::solve::{
-    BOUNDARY_DEGREES, Boundary, BoundaryEnergy, BoundaryOptions, CurveForm, TorsionHandle,
-    solve_boundary,
-};
+pub use boundary::solve::solve_boundary;
+pub use boundary::solved::Boundary;
 pub use curve::bezier::{BezierCurve, CurveJet, CurveQuality};
 pub use data::corners::{AsymptoticNet, CornerData, Curvatures, DATA_DEGREE, NetCurve, NetFace};
 pub use design::{Design, DesignMetrics, DesignOptions, Input, design};
 pub use error::{AsymptoticError, AsymptoticWarning, Place};
 pub use file::{DataFile, FileCurve, TorsionWish, torsion_handles};
-pub use lamella::strip::{
-    Lamella, LamellaNode, LamellaOptions, StripLayout, lamellas, strip_layout,
-};
-pub use patch::family::{Ansatz, FilledPatch, PatchBoundary, PatchOptions, fill_patch};
+pub use lamella::layout::{StripLayout, strip_layout};
+pub use lamella::strip::{Lamella, LamellaNode, LamellaOptions, lamellas};
 pub use patch::mask::Interior;
+pub use patch::options::{Ansatz, PatchOptions};
+pub use patch::solve::{FilledPatch, fill_patch};
 pub use patch::surface::{Patch, PatchJet};
 pub use patch::thin_plate::MAX_SURFACE_DEGREE;
 pub use patch::verify::PatchCheck;

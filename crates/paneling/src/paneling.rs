@@ -7,7 +7,8 @@ use crate::layout::panels::{PanelSet, Pose};
 use crate::mold::prices::PriceList;
 use crate::mold::shape::{Mold, MoldType};
 use crate::seam::measure::{Measures, measure};
-use crate::seam::step::{self as seam_step, SeamOptions};
+use crate::seam::step as seam_step;
+use crate::seam::system::SeamOptions;
 
 /// How panels are grouped by mold.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -108,7 +109,7 @@ impl Paneling {
     #[must_use]
     pub fn has_settled(&self) -> bool {
         let (history, stall) = if self.seam_history.is_empty() {
-            (&self.fit_history, crate::fit::state::STALL)
+            (&self.fit_history, crate::fit::alternation::STALL)
         } else {
             (&self.seam_history, SEAM_STALL)
         };

@@ -1,10 +1,11 @@
 //! One asymptotic quadrilateral: the boundary of a single patch, with its sign branches.
 
-use crate::boundary::solve::{BoundaryOptions, solve_boundary};
+use crate::boundary::four_curves::PatchBoundary;
+use crate::boundary::options::BoundaryOptions;
+use crate::boundary::solve::solve_boundary;
 use crate::curve::bezier::{BezierCurve, CurveQuality};
 use crate::data::corners::{CURVE_CORNERS, CornerData, Curvatures, DATA_DEGREE};
 use crate::error::{AsymptoticError, AsymptoticWarning, Place};
-use crate::patch::family::PatchBoundary;
 
 /// Binormal turning above which a curve is warned about, in radians.
 pub(crate) const TURNING_LIMIT: f64 = std::f64::consts::PI;

@@ -12,139 +12,20 @@ use rayon::prelude::*;
 
 use crate::boundary::inflection::InflectedCurve;
 use crate::boundary::normals::net::solve_by_normals;
+use crate::boundary::options::{BOUNDARY_DEGREES, BoundaryEnergy, BoundaryOptions, CurveForm};
+use crate::boundary::solved::Boundary;
 use crate::boundary::torsion_energy::TorsionCurve;
 use crate::curve::bernstein;
 use crate::curve::bezier::BezierCurve;
 use crate::data::corners::{AsymptoticNet, DATA_DEGREE};
-use crate::data::vertex::{PLANE_TOL, VertexFrame, curve_families, vertex_frames};
+use crate::data::vertex::{
+    PLANE_TOL, VertexFrame, arm_signs, bilinear_torsions, curve_families, vertex_frames,
+};
 use crate::error::{AsymptoticError, AsymptoticWarning};
 use geom_core::linalg::{AffineSpace, Cholesky, Matrix, affine_space, dot};
 
 /// A coefficient of a torsion equation this small, relative to the curve's size, is no coefficient.
 const VACUOUS_TOL: f64 = 1e-10;
-
-/// Least and highest degree of solved boundary curves.
-pub const BOUNDARY_DEGREES: [usize; 2] = [5, 9];
-
-/// What the freedom left by the corner data minimises (Wang et al. 2019, Remark 3.4).
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum BoundaryEnergy {
-    /// `Σ ∫ |r″|² dt`, the paper's Eq. 3.4.
-    #[default]
-    Strain,
-    /// `Σ ∫ |r‴|² dt`.
-    Jerk,
-    /// `Σ L ∫ τ² ds` with the chord `L`, over the corner torsions from the strain minimum.
-    Torsion,
-}
-
-/// What is wanted of the torsion at a vertex; `K = −τ²` there.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub enum TorsionHandle {
-    /// Left to the energy.
-    #[default]
-    Free,
-    /// Prescribed, in 1/length, for the curves in the u-direction.
-    Fixed(f64),
-    /// Kept between two values.
-    Between(f64, f64),
-}
-
-impl TorsionHandle {
-    /// The handle that prescribes the Gaussian curvature `K ≤ 0` at a corner, with the sign of
-    /// the torsion of the u-curves.
-    #[must_use]
-    pub fn gaussian(curvature: f64, sign: f64) -> Self {
-        Self::Fixed((-curvature).max(0.0).sqrt().copysign(sign))
-    }
-
-    /// The handle that keeps the Gaussian curvature between `min` and `max`, both at most zero.
-    #[must_use]
-    pub fn gaussian_between(min: f64, max: f64, sign: f64) -> Self {
-        let [large, small] = [min, max].map(|k| (-k).max(0.0).sqrt());
-        if sign < 0.0 { Self::Between(-large, -small) } else { Self::Between(small, large) }
-    }
-
-    pub(crate) fn bounds(self) -> [f64; 2] {
-        match self {
-            Self::Free => [f64::NEG_INFINITY, f64::INFINITY],
-            Self::Fixed(tau) => [tau, tau],
-            Self::Between(min, max) => [min, max],
-        }
-    }
-}
-
-/// What the boundary curves are made from.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum CurveForm {
-    /// By curvatures, but by normals where tangents and curvatures are estimates (nets made from meshes
-    /// and polylines) and a curve between two vertices has an inflection, or nearly one.
-    #[default]
-    Auto,
-    /// Curves with exactly the tangents and curvatures of the data, in the least-energy way.
-    Curvatures,
-    /// Curves of degree seven made from polynomial normals of degree four by Lelieuvre's formula
-    /// `r′ = ± N × N′`, which inflections do not disturb; curvatures are met approximately.
-    Normals,
-}
-
-/// Settings of the boundary solve.
-#[derive(Clone, Debug, PartialEq)]
-pub struct BoundaryOptions {
-    /// What the curves are made from.
-    pub form: CurveForm,
-    /// Degree of the curves, 5 to 9; those made from normals have 7 all the same.
-    pub degree: usize,
-    /// What is minimised.
-    pub energy: BoundaryEnergy,
-    /// Handles per vertex (missing ones are free).
-    pub torsions: Vec<TorsionHandle>,
-}
-
-impl Default for BoundaryOptions {
-    fn default() -> Self {
-        Self {
-            form: CurveForm::Auto,
-            degree: 5,
-            energy: BoundaryEnergy::Strain,
-            torsions: Vec::new(),
-        }
-    }
-}
-
-/// Solved boundary curves of a net.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Boundary {
-    /// One curve per curve of the net, in its direction.
-    pub curves: Vec<BezierCurve>,
-    /// Torsion per vertex, for the curves of the family of `r1` of the first face.
-    pub torsions: Vec<f64>,
-    /// `Σ ∫ |r″|² dt`.
-    pub strain_energy: f64,
-    /// Number of free torsions and further unknowns that the energy decided.
-    pub freedoms: usize,
-    /// Vacuous equations, odd valences.
-    pub warnings: Vec<AsymptoticWarning>,
-    /// Parameters of the declared inflections of each curve.
-    pub inflections: Vec<Vec<f64>>,
-    pub(crate) signs: Vec<[f64; 2]>,
-    /// Unit normal per vertex.
-    pub(crate) normals: Vec<DVec3>,
-}
-
-impl Boundary {
-    /// `+1` or `−1`: the torsion of the curve's end over the torsion of its vertex.
-    #[must_use]
-    pub fn torsion_sign(&self, curve: usize, end: usize) -> f64 {
-        self.signs[curve][end]
-    }
-
-    /// Whether the curves were made from normals, of one degree and with an energy of their own.
-    #[must_use]
-    pub fn is_from_normals(&self) -> bool {
-        self.curves.iter().any(|c| c.normals().is_some())
-    }
-}
 
 /// One curve as an affine function of the torsions at its ends.
 struct CondensedCurve {
@@ -292,17 +173,6 @@ fn inflected(
             iterations,
         }),
     }
-}
-
-/// Torsion sign of each end of each curve.
-pub(crate) fn arm_signs(net: &AsymptoticNet, frames: &[Option<VertexFrame>]) -> Vec<[f64; 2]> {
-    let mut signs = vec![[0.0; 2]; net.curves.len()];
-    for frame in frames.iter().flatten() {
-        for ((curve, end), sign) in frame.arms.iter().zip(&frame.signs) {
-            signs[*curve][*end] = *sign;
-        }
-    }
-    signs
 }
 
 /// Curve `i` with everything but its end torsions minimised out.
@@ -481,30 +351,6 @@ fn pin_torsions(
         }
     }
     Ok(())
-}
-
-/// Torsion `N·R_uv / |R_u × R_v|` of the bilinear patches in the faces at each vertex, averaged.
-pub(crate) fn bilinear_torsions(
-    net: &AsymptoticNet,
-    signs: &[[f64; 2]],
-    frames: &[Option<VertexFrame>],
-) -> Vec<f64> {
-    let mut sums = vec![[0.0, 0.0]; frames.len()];
-    for face in &net.faces {
-        let corners: [usize; 4] = std::array::from_fn(|c| net.face_corner(face, c));
-        let x = corners.map(|v| net.positions[v]);
-        let twist = x[3] - x[1] - x[2] + x[0];
-        let (along_u, along_v) = ([x[1] - x[0], x[3] - x[2]], [x[2] - x[0], x[3] - x[1]]);
-        for (c, v) in corners.into_iter().enumerate() {
-            let normal = along_u[c / 2].cross(along_v[c % 2]);
-            let u_curve = 2 * (c / 2);
-            let end = usize::from((c % 2 == 1) != face.reversed[u_curve]);
-            let sign = signs[face.curves[u_curve]][end];
-            sums[v][0] += sign * normal.dot(twist) / normal.length_squared();
-            sums[v][1] += 1.0;
-        }
-    }
-    sums.iter().map(|[sum, count]| if *count > 0.0 { sum / count } else { 0.0 }).collect()
 }
 
 /// Minimises the sum of the condensed energies over the torsions within their bounds.

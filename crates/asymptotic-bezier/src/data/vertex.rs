@@ -1,4 +1,5 @@
-//! Vertices of a net: tangent planes, and which arms share a torsion and which its opposite.
+//! Vertices of a net: tangent planes, which arms share a torsion and which its opposite, and what
+//! the corners say about it.
 
 use geom_core::DVec3;
 
@@ -184,4 +185,39 @@ fn alternate(
         }
     }
     (signs, odd)
+}
+
+/// Torsion sign of each end of each curve.
+pub(crate) fn arm_signs(net: &AsymptoticNet, frames: &[Option<VertexFrame>]) -> Vec<[f64; 2]> {
+    let mut signs = vec![[0.0; 2]; net.curves.len()];
+    for frame in frames.iter().flatten() {
+        for ((curve, end), sign) in frame.arms.iter().zip(&frame.signs) {
+            signs[*curve][*end] = *sign;
+        }
+    }
+    signs
+}
+
+/// Torsion `N·R_uv / |R_u × R_v|` of the bilinear patches in the faces at each vertex, averaged.
+pub(crate) fn bilinear_torsions(
+    net: &AsymptoticNet,
+    signs: &[[f64; 2]],
+    frames: &[Option<VertexFrame>],
+) -> Vec<f64> {
+    let mut sums = vec![[0.0, 0.0]; frames.len()];
+    for face in &net.faces {
+        let corners: [usize; 4] = std::array::from_fn(|c| net.face_corner(face, c));
+        let x = corners.map(|v| net.positions[v]);
+        let twist = x[3] - x[1] - x[2] + x[0];
+        let (along_u, along_v) = ([x[1] - x[0], x[3] - x[2]], [x[2] - x[0], x[3] - x[1]]);
+        for (c, v) in corners.into_iter().enumerate() {
+            let normal = along_u[c / 2].cross(along_v[c % 2]);
+            let u_curve = 2 * (c / 2);
+            let end = usize::from((c % 2 == 1) != face.reversed[u_curve]);
+            let sign = signs[face.curves[u_curve]][end];
+            sums[v][0] += sign * normal.dot(twist) / normal.length_squared();
+            sums[v][1] += 1.0;
+        }
+    }
+    sums.iter().map(|[sum, count]| if *count > 0.0 { sum / count } else { 0.0 }).collect()
 }

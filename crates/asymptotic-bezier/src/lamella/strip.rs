@@ -7,12 +7,10 @@
 
 use geom_core::DVec3;
 
-use crate::boundary::solve::Boundary;
-use crate::curve::bezier::{BezierCurve, JetTable};
+use crate::boundary::solved::Boundary;
 use crate::data::corners::AsymptoticNet;
+use crate::lamella::profile::Profile;
 
-/// Samples per curve.
-const SAMPLES: usize = 201;
 /// Through-going arms make at least this angle's cosine (about 25 degrees off straight).
 const STRAIGHT_COSINE: f64 = -0.9;
 
@@ -83,62 +81,6 @@ pub fn lamellas(
     options: &LamellaOptions,
 ) -> Vec<Lamella> {
     chains(net, boundary).into_iter().map(|chain| measure(net, boundary, chain, options)).collect()
-}
-
-/// Drawing of one unrolled strip: lengths along x, widths along y.
-#[derive(Clone, Debug, PartialEq)]
-pub struct StripLayout {
-    /// Number of the lamella.
-    pub lamella: usize,
-    /// Closed outline with the slots cut in.
-    pub outline: Vec<DVec3>,
-    /// Lines across the strip at its nodes.
-    pub marks: Vec<[DVec3; 2]>,
-    /// Where the names of the nodes go, with their vertices.
-    pub labels: Vec<(DVec3, usize)>,
-}
-
-/// Lays the strips out one above the other; `gap` is the distance between them.
-///
-/// Slots come from the upper edge in one family and from the lower in the other, so that the
-/// lamellas plug into one another.
-#[must_use]
-pub fn strip_layout(lamellas: &[Lamella], options: &LamellaOptions, gap: f64) -> Vec<StripLayout> {
-    let w = options.width;
-    lamellas
-        .iter()
-        .enumerate()
-        .map(|(k, lamella)| {
-            let base = -(k as f64) * (w + gap);
-            let at = |x: f64, y: f64| DVec3::new(x, base + y, 0.0);
-            // The slotted edge runs from the start of the strip to its end.
-            let (slotted, plain) = if lamella.family > 0.0 { (w, 0.0) } else { (0.0, w) };
-            let mut outline = vec![at(0.0, plain), at(0.0, slotted)];
-            for node in &lamella.nodes {
-                if node.slot_width.is_nan() {
-                    continue;
-                }
-                // A slot at the end of a strip is cut open.
-                let from = (node.arc - 0.5 * node.slot_width).max(0.0);
-                let to = (node.arc + 0.5 * node.slot_width).min(lamella.length);
-                let floor = slotted + (plain - slotted) * node.slot_depth / w;
-                outline.extend([
-                    at(from, slotted),
-                    at(from, floor),
-                    at(to, floor),
-                    at(to, slotted),
-                ]);
-            }
-            outline.extend([at(lamella.length, slotted), at(lamella.length, plain)]);
-            outline.dedup();
-            StripLayout {
-                lamella: k,
-                outline,
-                marks: lamella.nodes.iter().map(|n| [at(n.arc, 0.0), at(n.arc, w)]).collect(),
-                labels: lamella.nodes.iter().map(|n| (at(n.arc, 0.5 * w), n.vertex)).collect(),
-            }
-        })
-        .collect()
 }
 
 /// Follows each curve through its vertices as long as one of the same family goes straight on.
@@ -270,93 +212,5 @@ fn node(
         slot_depth: 0.5 * options.width,
         normal: boundary.normals[vertex],
         direction: if end == 0 { arm } else { -arm },
-    }
-}
-
-/// Sampled integrals and extremes of one curve.
-struct Profile {
-    length: f64,
-    curvature: f64,
-    torsion: f64,
-    twist: f64,
-    width_bound: f64,
-    bending: f64,
-    twisting: f64,
-}
-
-impl Profile {
-    fn new(curve: &BezierCurve, line: bool) -> Self {
-        let table = JetTable::new(curve);
-        let mut out = Self {
-            length: 0.0,
-            curvature: 0.0,
-            torsion: 0.0,
-            twist: 0.0,
-            width_bound: f64::INFINITY,
-            bending: 0.0,
-            twisting: 0.0,
-        };
-        let step = 1.0 / (SAMPLES - 1) as f64;
-        let mut last: Option<(f64, f64)> = None;
-        for k in 0..SAMPLES {
-            let t = k as f64 * step;
-            let jet = table.at(t);
-            // Simpson's rule: fourth order, and the samples are needed for the extremes anyway.
-            let share = match k {
-                0 => 1.0,
-                _ if k == SAMPLES - 1 => 1.0,
-                _ if k % 2 == 1 => 4.0,
-                _ => 2.0,
-            };
-            let ds = share * step / 3.0 * jet.first.length();
-            out.length += ds;
-            if line {
-                continue;
-            }
-            let (kappa, tau) = (jet.curvature(), table.torsion(t, &jet));
-            out.curvature = out.curvature.max(kappa);
-            out.torsion = out.torsion.max(tau.abs());
-            out.twist += ds * tau.abs();
-            out.bending += ds * kappa * kappa;
-            out.twisting += ds * tau * tau;
-            let ratio = tau / kappa;
-            if let Some((before, speed)) = last {
-                let length = 0.5 * (speed + jet.first.length()) * step;
-                out.width_bound = out.width_bound.min(2.0 * length / (ratio - before).abs());
-            }
-            last = Some((ratio, jet.first.length()));
-        }
-        out
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn profile_of_a_helix_has_its_constant_curvature_and_torsion() {
-        // Radius 1, pitch slope 0.5, one radian, interpolated by a degree-nine polynomial.
-        let n = 9;
-        let points: Vec<DVec3> = {
-            let mut matrix = geom_core::linalg::Matrix::zeros(n + 1, n + 1);
-            for r in 0..=n {
-                let basis = crate::curve::bernstein::bernstein(n, r as f64 / n as f64);
-                matrix.row_mut(r).copy_from_slice(&basis);
-            }
-            let helix = |t: f64| DVec3::new(t.cos(), t.sin(), 0.5 * t);
-            let solve = |axis: usize| {
-                let b: Vec<f64> = (0..=n).map(|r| helix(r as f64 / n as f64)[axis]).collect();
-                geom_core::linalg::affine_space(&matrix, &b, &[1.0; 10], 1e-14).particular
-            };
-            let (x, y, z) = (solve(0), solve(1), solve(2));
-            (0..=n).map(|k| DVec3::new(x[k], y[k], z[k])).collect()
-        };
-        let profile = Profile::new(&BezierCurve::new(points), false);
-        let c = 1.25_f64;
-        assert!((profile.length - c.sqrt()).abs() < 1e-7);
-        assert!((profile.curvature - 1.0 / c).abs() < 1e-4);
-        assert!((profile.torsion - 0.5 / c).abs() < 1e-2);
-        assert!((profile.twisting - (0.5 / c).powi(2) * c.sqrt()).abs() < 1e-5);
     }
 }

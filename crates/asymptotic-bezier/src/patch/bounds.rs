@@ -2,7 +2,8 @@
 
 use geom_core::DVec3;
 
-use crate::patch::family::{PatchBoundary, PatchFamily};
+use crate::boundary::four_curves::PatchBoundary;
+use crate::patch::family::PatchFamily;
 use geom_core::linalg::axpy;
 use gp_solver::{DenseQp, Status};
 

@@ -1,92 +1,22 @@
-//! The patch between four asymptotic curves: one quadratic programme over tangent fields and
-//! inner control points.
+//! All patches of one degree between four asymptotic curves: affine in the freedoms of the tangent
+//! fields, with a quadratic energy.
 
 use geom_core::DVec3;
 
+use crate::boundary::four_curves::PatchBoundary;
 use crate::curve::bernstein::{bernstein, elevate, eval};
-use crate::curve::bezier::BezierCurve;
-use crate::error::{AsymptoticError, AsymptoticWarning, Place};
-use crate::patch::bounds;
+use crate::error::{AsymptoticError, Place};
 use crate::patch::field::{FieldSpace, paper_ansatz, tangent_fields};
-use crate::patch::mask::{Interior, masked};
+use crate::patch::options::Ansatz;
 use crate::patch::surface::Patch;
-use crate::patch::thin_plate::{MAX_SURFACE_DEGREE, fill_table};
-use geom_core::linalg::{Matrix, affine_space, axpy, dot, minimize_quadratic};
+use crate::patch::thin_plate::fill_table;
+use geom_core::linalg::{Matrix, affine_space, axpy, dot};
 
 /// Rank tolerance of the corner equations after scaling of the columns.
 pub(crate) const RANK_TOL: f64 = 1e-10;
 
 /// Largest residual of the corner equations relative to the patch.
 pub(crate) const CORNER_TOL: f64 = 1e-8;
-
-/// Which tangent fields are used.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Ansatz {
-    /// All polynomial tangent fields of the degree.
-    #[default]
-    Module,
-    /// `x r′ + y (r′ × r″) × r′` with the free coefficients of `x` zero, degree `3p − 4`.
-    Paper,
-    /// The same fields with the free coefficients of `x` left to the energy.
-    PaperFree,
-}
-
-/// Settings of the patch solve.
-#[derive(Clone, Debug, PartialEq)]
-pub struct PatchOptions {
-    /// Degree in u and v; `None` takes 7 and goes to 8 and 11 where that folds.
-    pub degree: Option<usize>,
-    /// Tangent fields.
-    pub ansatz: Ansatz,
-    /// Transversality is kept above this share of the linear interpolation of its corner values;
-    /// `None` switches the bounds off.
-    pub bound: Option<f64>,
-    /// Least sine between parameter lines before the next degree is tried.
-    pub min_sine: f64,
-    /// How the inner control points are found once the tangent fields are.
-    pub interior: Interior,
-}
-
-impl Default for PatchOptions {
-    fn default() -> Self {
-        Self {
-            degree: None,
-            ansatz: Ansatz::Module,
-            bound: Some(0.25),
-            min_sine: 0.1,
-            interior: Interior::ThinPlate,
-        }
-    }
-}
-
-/// Boundary of one patch, curves directed as `r1..r4`.
-#[derive(Clone, Debug, PartialEq)]
-pub struct PatchBoundary {
-    /// `r1(u) = R(u,0)`, `r2(v) = R(0,v)`, `r3(u) = R(u,1)`, `r4(v) = R(1,v)`.
-    pub curves: [BezierCurve; 4],
-    /// Which are straight.
-    pub lines: [bool; 4],
-    /// Parameters of their inflections.
-    pub inflections: [Vec<f64>; 4],
-    /// Across a straight curve, a cubic direction field the tangent planes must contain; without
-    /// one they are free. Patches on both sides of a line share it, which makes the join G1.
-    pub ribbons: [Option<[DVec3; 4]>; 4],
-}
-
-/// A filled patch.
-#[derive(Clone, Debug, PartialEq)]
-pub struct FilledPatch {
-    /// The surface.
-    pub patch: Patch,
-    /// `∫∫ |R_uu|² + 2 |R_uv|² + |R_vv|²`.
-    pub thin_plate_energy: f64,
-    /// Freedoms of the tangent fields.
-    pub freedoms: usize,
-    /// Least transversality along the boundary, relative to the interpolated corner values.
-    pub transversality: f64,
-    /// Bounds that were needed, degrees that were raised.
-    pub warnings: Vec<AsymptoticWarning>,
-}
 
 /// A sparse vector equation: coefficients by column, and the right side.
 pub(crate) type VectorEquation = (Vec<(usize, DVec3)>, DVec3);
@@ -97,68 +27,6 @@ pub(crate) const CORNERS: [[(usize, usize); 2]; 4] =
 
 /// Whether the inward direction at curve `i` is with (`+1`) or against (`−1`) the parameter.
 pub(crate) const INWARD: [f64; 4] = [1.0, 1.0, -1.0, -1.0];
-
-/// Fills one boundary; `place` names the patch in messages.
-///
-/// # Errors
-/// [`AsymptoticError::Degree`], [`AsymptoticError::CornerEquations`], and
-/// [`AsymptoticError::Folded`] when no degree gives a regular boundary.
-pub fn fill_patch(
-    boundary: &PatchBoundary,
-    options: &PatchOptions,
-    place: Place,
-) -> Result<FilledPatch, AsymptoticError> {
-    let p = boundary.curves[0].degree();
-    let paper = 3 * p - 4;
-    let tried: &[usize] = match (options.ansatz, options.degree) {
-        (Ansatz::Module, Some(n)) => &[n],
-        // Curves made from normals leave their patches as much freedom as quintics do.
-        (Ansatz::Module, None) if boundary.curves.iter().all(|c| c.normals().is_some()) => {
-            &[7, 8, 11]
-        }
-        (Ansatz::Module, None) => match p {
-            ..=5 => &[7, 8, 11],
-            6 => &[8, 9, 12],
-            7 => &[9, 10, 13],
-            8 => &[10, 11, 14],
-            _ => &[11, 12, 15],
-        },
-        _ => &[paper],
-    };
-    let first = tried[0];
-    let mut best: Option<FilledPatch> = None;
-    let mut failure = None;
-    for &n in tried {
-        let min = if p == 4 { 5 } else { p };
-        if !(min..=MAX_SURFACE_DEGREE).contains(&n) {
-            let (degree, max) = (n, MAX_SURFACE_DEGREE);
-            return Err(AsymptoticError::Degree { what: "surface", degree, min, max });
-        }
-        match fill_degree(boundary, n, options, place) {
-            Ok(mut filled) => {
-                if n != first {
-                    filled.warnings.push(AsymptoticWarning::DegreeRaised {
-                        place,
-                        from: first,
-                        to: n,
-                    });
-                }
-                if tried.len() == 1 || filled.patch.least_sine(16) >= options.min_sine {
-                    return Ok(filled);
-                }
-                best.get_or_insert(filled);
-            }
-            Err(error @ AsymptoticError::Folded { .. }) => {
-                failure.get_or_insert(error);
-            }
-            Err(error) => return Err(error),
-        }
-    }
-    // None has the sine asked for: the lowest regular degree is as good as any.
-    best.ok_or_else(|| {
-        failure.unwrap_or(AsymptoticError::CornerEquations { place, residual: f64::NAN })
-    })
-}
 
 /// The affine family of control points in the freedoms of the tangent fields.
 pub(crate) struct PatchFamily {
@@ -179,47 +47,6 @@ pub(crate) struct PatchFamily {
     /// Thin-plate energy `½ yᵀ H y + gᵀ y + c` (twice the coefficients of the energy).
     pub(crate) hessian: Matrix,
     pub(crate) gradient: Vec<f64>,
-}
-
-fn fill_degree(
-    boundary: &PatchBoundary,
-    n: usize,
-    options: &PatchOptions,
-    place: Place,
-) -> Result<FilledPatch, AsymptoticError> {
-    let family = PatchFamily::new(boundary, n, options.ansatz, place)?;
-    let mut y = minimize_quadratic(&family.hessian, &family.gradient);
-    let mut warnings = Vec::new();
-    let strips = bounds::strips(&family, boundary);
-    let mut transversality = strips.worst(&family, &y);
-    // The fidelity mode shows what the paper's fields do, so nothing is added to it.
-    if let (Some(theta), Ansatz::Module) = (options.bound, options.ansatz)
-        && transversality.value < theta - 1e-12
-    {
-        if let Some(bounded) = strips.minimize(&family, theta) {
-            y = bounded;
-            transversality = strips.worst(&family, &y);
-            warnings.push(AsymptoticWarning::BoundsActive { place });
-        }
-        if !(transversality.value > 0.0) {
-            return Err(AsymptoticError::Folded {
-                place,
-                curve: Place::PatchCurve(transversality.curve),
-                worst: transversality.value,
-                t: transversality.t,
-                degree: n,
-            });
-        }
-    }
-    let thin_plate = family.patch(&y);
-    let (patch, thin_plate_energy) = masked(&thin_plate.0, options.interior).unwrap_or(thin_plate);
-    Ok(FilledPatch {
-        patch,
-        thin_plate_energy,
-        freedoms: y.len(),
-        transversality: transversality.value,
-        warnings,
-    })
 }
 
 impl PatchFamily {

@@ -6,6 +6,8 @@ pub(crate) mod family;
 pub(crate) mod field;
 pub(crate) mod intersect;
 pub(crate) mod mask;
+pub(crate) mod options;
+pub(crate) mod solve;
 pub(crate) mod surface;
 pub(crate) mod thin_plate;
 pub(crate) mod verify;

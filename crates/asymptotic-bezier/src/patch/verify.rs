@@ -2,8 +2,8 @@
 
 use geom_core::DVec3;
 
+use crate::boundary::four_curves::PatchBoundary;
 use crate::error::{AsymptoticWarning, Place};
-use crate::patch::family::PatchBoundary;
 use crate::patch::intersect::self_intersections;
 use crate::patch::surface::{BasisTable, Patch};
 

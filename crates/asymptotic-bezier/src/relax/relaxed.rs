@@ -10,14 +10,14 @@
 //! weight of the fairness is raised from small values until the result is acceptable, so data
 //! that are nearly good are hardly touched. One patch is a net of one face.
 
+use crate::boundary::options::{BoundaryOptions, TorsionHandle};
 use crate::boundary::quad::{TURNING_LIMIT, solve_quadrilateral};
-use crate::boundary::solve::{
-    Boundary, BoundaryOptions, TorsionHandle, arm_signs, bilinear_torsions, solve_boundary,
-};
+use crate::boundary::solve::solve_boundary;
+use crate::boundary::solved::Boundary;
 use crate::data::corners::{AsymptoticNet, CURVE_CORNERS, CornerData, Curvatures, INTO_IS_LEFT};
-use crate::data::vertex::vertex_frames;
+use crate::data::vertex::{arm_signs, bilinear_torsions, vertex_frames};
 use crate::error::AsymptoticError;
-use crate::patch::family::PatchOptions;
+use crate::patch::options::PatchOptions;
 use crate::relax::model::Model;
 use crate::shell::gridshell::fill_solved;
 use crate::shell::joint::Joins;

@@ -7,13 +7,17 @@
 use geom_core::DVec3;
 use rayon::prelude::*;
 
+use crate::boundary::four_curves::PatchBoundary;
+use crate::boundary::options::BoundaryOptions;
 use crate::boundary::quad::check_curve;
-use crate::boundary::solve::{Boundary, BoundaryOptions, solve_boundary};
+use crate::boundary::solve::solve_boundary;
+use crate::boundary::solved::Boundary;
 use crate::curve::bezier::CurveQuality;
 use crate::data::corners::AsymptoticNet;
 use crate::error::{AsymptoticError, AsymptoticWarning, Place};
-use crate::patch::family::{Ansatz, FilledPatch, PatchBoundary, PatchOptions, fill_patch};
 use crate::patch::mask::Interior;
+use crate::patch::options::{Ansatz, PatchOptions};
+use crate::patch::solve::{FilledPatch, fill_patch};
 use crate::patch::surface::{BasisTable, Patch, PatchJet};
 use crate::patch::verify::PatchCheck;
 use crate::shell::joint::{Joins, fill_joint};

@@ -15,13 +15,15 @@ use geom_core::linalg::{Matrix, affine_space, axpy};
 use gp_solver::{SolverError, SparseCholesky, SymmetricPattern};
 use rayon::prelude::*;
 
-use crate::boundary::solve::Boundary;
+use crate::boundary::four_curves::PatchBoundary;
+use crate::boundary::solved::Boundary;
 use crate::curve::bernstein::{bernstein, eval};
 use crate::data::corners::{AsymptoticNet, NetFace};
 use crate::error::{AsymptoticError, AsymptoticWarning, Place};
-use crate::patch::family::{CORNER_TOL, FilledPatch, INWARD, PatchBoundary, PatchFamily, RANK_TOL};
+use crate::patch::family::{CORNER_TOL, INWARD, PatchFamily, RANK_TOL};
 use crate::patch::field::{FieldSpace, tangent_fields};
 use crate::patch::mask::thin_plate_energy;
+use crate::patch::solve::FilledPatch;
 use crate::patch::surface::Patch;
 use crate::patch::thin_plate::{fill_table, thin_plate_block};
 

@@ -1,7 +1,8 @@
 //! Panels of a surface: sample points, normals, frames, and the seams between them.
 
 use crate::error::PanelingError;
-use crate::layout::tiling::{Corner, Layout};
+use crate::layout::polygon::Corner;
+use crate::layout::tiling::Layout;
 use bspline::BsplineSurface;
 use geom_core::{BoundingBox, SurfaceJet, principal_curvatures};
 use glam::{DMat3, DVec3};

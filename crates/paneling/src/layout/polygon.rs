@@ -1,8 +1,16 @@
-//! Checks of polygons in the plane.
+//! Panels as polygons in the plane, and checks of them.
 
 use crate::error::PanelingError;
-use crate::layout::tiling::Corner;
 use std::collections::HashMap;
+
+/// A corner of a panel.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Corner {
+    /// The same for all panels that meet there.
+    pub(crate) vertex: usize,
+    /// Place in the unit square; beyond 1 in a panel that crosses the seam of a closed surface.
+    pub(crate) uv: [f64; 2],
+}
 
 /// Signed area, positive if counterclockwise.
 pub(crate) fn area(polygon: &[Corner]) -> f64 {

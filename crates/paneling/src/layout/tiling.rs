@@ -1,6 +1,7 @@
 //! Seam layouts: polygons over the unit square, which stands for the domain of the surface.
 
 use crate::error::PanelingError;
+use crate::layout::polygon::{self, Corner};
 use bspline::BsplineSurface;
 use std::collections::HashMap;
 
@@ -45,15 +46,6 @@ impl Pattern {
     pub fn from_name(name: &str) -> Option<Self> {
         Self::ALL.into_iter().find(|p| p.name() == name)
     }
-}
-
-/// A corner of a panel.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Corner {
-    /// The same for all panels that meet there.
-    pub(crate) vertex: usize,
-    /// Place in the unit square; beyond 1 in a panel that crosses the seam of a closed surface.
-    pub(crate) uv: [f64; 2],
 }
 
 /// A layout: panels as polygons over the unit square, counterclockwise; no edge belongs to more
@@ -166,10 +158,10 @@ impl Layout {
         let mut panels: Vec<Vec<Corner>> =
             faces.iter().map(|f| f.iter().map(corner).collect()).collect();
         // A layout drawn clockwise throughout is turned over as a whole.
-        if panels.iter().map(|p| crate::layout::polygon::area(p)).sum::<f64>() < 0.0 {
+        if panels.iter().map(|p| polygon::area(p)).sum::<f64>() < 0.0 {
             panels.iter_mut().for_each(|p| p.reverse());
         }
-        crate::layout::polygon::check(&panels)?;
+        polygon::check(&panels)?;
         Ok(Self { panels })
     }
 
@@ -353,7 +345,7 @@ mod tests {
     use geom_core::assert_close;
 
     fn total_area(layout: &Layout) -> f64 {
-        layout.panels().iter().map(|p| crate::layout::polygon::area(p)).sum()
+        layout.panels().iter().map(|p| polygon::area(p)).sum()
     }
 
     #[test]
@@ -364,7 +356,7 @@ mod tests {
                 assert_close(total_area(&layout), 1.0, 1e-12);
                 let mut edges: HashMap<(usize, usize), usize> = HashMap::new();
                 for panel in layout.panels() {
-                    assert!(crate::layout::polygon::area(panel) > 0.0, "{pattern:?} {closed:?}");
+                    assert!(polygon::area(panel) > 0.0, "{pattern:?} {closed:?}");
                     for (k, a) in panel.iter().enumerate() {
                         let b = panel[(k + 1) % panel.len()];
                         *edges.entry((a.vertex, b.vertex)).or_default() += 1;
@@ -376,7 +368,7 @@ mod tests {
                 assert_eq!(border == 0, closed == [true, true], "{pattern:?} {closed:?}: {border}");
             }
             let layout = Layout::generate(pattern, 5, 6, [false, false]).unwrap();
-            crate::layout::polygon::check(layout.panels()).unwrap();
+            polygon::check(layout.panels()).unwrap();
         }
     }
 

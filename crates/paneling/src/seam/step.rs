@@ -8,21 +8,8 @@ use crate::fit::residuals::foot;
 use crate::fit::retraction::moved_on;
 use crate::fit::state::{EXACT, Fit};
 use crate::layout::panels::{PanelSet, SEAM_SAMPLES, Seam};
-use crate::seam::system::{System, Unknowns};
+use crate::seam::system::{SeamOptions, System, Unknowns};
 use rayon::prelude::*;
-
-/// Settings of the joint seam step.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct SeamOptions {
-    /// Most Gauss-Newton steps.
-    pub(crate) steps: usize,
-    /// Weight of a gap in units of the panel size, against a kink in radians.
-    pub(crate) gap_weight: f64,
-    /// Weight of the distance to the design against the seams.
-    pub(crate) design_weight: f64,
-    /// Ends when a step lowers the energy by less than this share.
-    pub(crate) stall: f64,
-}
 
 /// Damping of the first step, a share of the diagonal.
 const FIRST_DAMPING: f64 = 1e-2;

@@ -9,7 +9,6 @@ use crate::fit::residuals::{POSE, SIDE, seam_side};
 use crate::fit::state::Fit;
 use crate::layout::panels::{PanelSet, SEAM_SAMPLES};
 use crate::mold::shape::MAX_PARAMETERS;
-use crate::seam::step::SeamOptions;
 use crate::small::{factor, solve_factored};
 use rayon::prelude::*;
 
@@ -19,6 +18,19 @@ const ROWS: usize = 3 * SEAM_SAMPLES;
 const CG_TOLERANCE: f64 = 0.03;
 /// Most conjugate gradient steps per linearisation.
 const CG_STEPS: usize = 40;
+
+/// Settings of the joint seam step.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct SeamOptions {
+    /// Most Gauss-Newton steps.
+    pub(crate) steps: usize,
+    /// Weight of a gap in units of the panel size, against a kink in radians.
+    pub(crate) gap_weight: f64,
+    /// Weight of the distance to the design against the seams.
+    pub(crate) design_weight: f64,
+    /// Ends when a step lowers the energy by less than this share.
+    pub(crate) stall: f64,
+}
 
 /// A point of the space of all poses and molds.
 #[derive(Clone)]

@@ -14,10 +14,13 @@ use gp_solver::{Closeness, MinNormProjection, Options, Problem, ProjectionOption
 
 use crate::boundary::normals::blocks::{Exactness, Fairness};
 use crate::boundary::normals::curve::{COLUMNS, CURVE_DEGREE, CurveEnd, LINE, NormalCurve, OWN};
-use crate::boundary::solve::{Boundary, BoundaryOptions, arm_signs, bilinear_torsions};
+use crate::boundary::options::BoundaryOptions;
+use crate::boundary::solved::Boundary;
 use crate::curve::bezier::BezierCurve;
 use crate::data::corners::{AsymptoticNet, DATA_DEGREE};
-use crate::data::vertex::{PLANE_TOL, VertexFrame, curve_families, vertex_frames};
+use crate::data::vertex::{
+    PLANE_TOL, VertexFrame, arm_signs, bilinear_torsions, curve_families, vertex_frames,
+};
 use crate::error::{AsymptoticError, AsymptoticWarning};
 
 /// Estimated torsions are kept above this share of their median: less is noise at flat places.
