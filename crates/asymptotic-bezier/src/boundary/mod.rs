@@ -1,5 +1,5 @@
-//! The boundary curves of a net or of one patch, solved from tangents and curvatures at the corners or
-//! from normals.
+//! The boundary curves of a net or of one patch, solved from tangents and curvatures at the corners
+//! or from normals.
 
 pub(crate) mod four_curves;
 pub(crate) mod inflection;

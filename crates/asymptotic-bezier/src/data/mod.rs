@@ -1,5 +1,5 @@
-//! What is given: corners with tangents and curvatures, nets of curves made from them, from meshes and
-//! from polylines, and the tangent planes at the vertices of a net.
+//! What is given: corners with tangents and curvatures, nets of curves made from them, from meshes
+//! and from polylines, and the tangent planes at the vertices of a net.
 
 pub(crate) mod corners;
 pub(crate) mod net;

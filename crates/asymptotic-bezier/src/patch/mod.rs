@@ -1,5 +1,5 @@
-//! The Bezier patch between four asymptotic curves: its tangent fields, its inner control points, and
-//! what it is worth.
+//! The Bezier patch between four asymptotic curves: its tangent fields, its inner control points,
+//! and what it is worth.
 
 pub(crate) mod bounds;
 pub(crate) mod family;

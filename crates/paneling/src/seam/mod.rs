@@ -1,4 +1,5 @@
-//! The seams between panels: kinks and gaps measured, and lowered by moving all molds and poses at once.
+//! The seams between panels: kinks and gaps measured, and lowered by moving all molds and poses at
+//! once.
 
 pub(crate) mod measure;
 pub(crate) mod step;
