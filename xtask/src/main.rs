@@ -17,7 +17,7 @@ const HELP: &str = "\
 cargo xtask <chore>
 
   ci                       what CI runs: fmt, clippy, tests, doc tests, docs, tidy, regress
-  tidy                     dependency directions, cited papers, stray paths, file sizes
+  tidy                     arrows between crates, circles of files, cited papers, stray paths, sizes
   regress [NAME…]          run the scenes under fixtures/regress (all, or those named)
   regress --bless NAME     rewrite the CloseTo values of one scene (never a bound)
   judges                   let independent programs read what we write, where they are installed

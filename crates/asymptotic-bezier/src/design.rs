@@ -1,14 +1,17 @@
 //! From input to measured result in one call: what the command line runs.
 
-use crate::boundary::{Boundary, BoundaryOptions, solve_boundary};
-use crate::data::{AsymptoticNet, CURVE_CORNERS, CornerData};
+use crate::boundary::options::BoundaryOptions;
+use crate::boundary::quad::{Quadrilateral, doubt_signs, solve_quadrilateral};
+use crate::boundary::quartic::solve_quartic_quadrilateral;
+use crate::boundary::solve::solve_boundary;
+use crate::boundary::solved::Boundary;
+use crate::data::corners::{AsymptoticNet, CURVE_CORNERS, CornerData};
 use crate::error::{AsymptoticError, Place};
-use crate::gridshell::{Gridshell, GridshellCheck, fill_solved};
-use crate::joint::Joins;
-use crate::patch::{PatchOptions, fill_patch};
-use crate::quad::{Quadrilateral, doubt_signs, solve_quadrilateral};
-use crate::quartic::solve_quartic_quadrilateral;
-use crate::relax::{RelaxOptions, Relaxed, relax, relax_patch};
+use crate::patch::options::PatchOptions;
+use crate::patch::solve::fill_patch;
+use crate::relax::relaxed::{RelaxOptions, Relaxed, relax, relax_patch};
+use crate::shell::gridshell::{Gridshell, GridshellCheck, fill_solved};
+use crate::shell::joint::Joins;
 
 /// What is to be bounded by asymptotic curves.
 #[derive(Clone, Debug, PartialEq)]
@@ -177,7 +180,7 @@ impl Design {
     #[must_use]
     pub fn metrics(&self) -> DesignMetrics {
         let checks = &self.check.patches;
-        let most = |f: fn(&crate::verify::PatchCheck) -> f64| {
+        let most = |f: fn(&crate::patch::verify::PatchCheck) -> f64| {
             checks.iter().map(f).fold(0.0, |a, b| if b.is_nan() { b } else { f64::max(a, b) })
         };
         DesignMetrics {

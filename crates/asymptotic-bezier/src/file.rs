@@ -5,11 +5,11 @@ use std::collections::BTreeMap;
 use geom_core::DVec3;
 use serde::{Deserialize, Serialize};
 
-use crate::boundary::{TorsionHandle, arm_signs, bilinear_torsions};
-use crate::data::{AsymptoticNet, CornerData, Curvatures, NetCurve};
+use crate::boundary::options::TorsionHandle;
+use crate::data::corners::{AsymptoticNet, CornerData, Curvatures, NetCurve};
+use crate::data::vertex::{arm_signs, bilinear_torsions, vertex_frames};
 use crate::design::Input;
 use crate::error::AsymptoticError;
-use crate::vertex::vertex_frames;
 
 /// Content of an input file. Either the fields of a patch (`X`, `P_i1`, `P_i4` and `signed_k` or
 /// `unsigned_k`) or those of a net (`vertices`, `quads`, `curves`) are there.

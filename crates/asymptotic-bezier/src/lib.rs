@@ -27,54 +27,38 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
-mod bernstein;
 mod boundary;
-mod bounds;
 mod curve;
 mod data;
 mod design;
 mod error;
-mod field;
 mod file;
-mod fill;
-mod gridshell;
-mod inflection;
-mod intersect;
-mod joint;
 mod lamella;
-mod mask;
-mod net;
-mod normal_blocks;
-mod normal_curve;
-mod normal_net;
 mod patch;
-mod polylines;
-mod quad;
-mod quartic;
 mod relax;
-mod surface;
-mod torsion_energy;
-mod torsion_qp;
-mod verify;
-mod vertex;
+mod shell;
 
-pub use boundary::{
-    BOUNDARY_DEGREES, Boundary, BoundaryEnergy, BoundaryOptions, CurveForm, TorsionHandle,
-    solve_boundary,
+pub use boundary::four_curves::PatchBoundary;
+pub use boundary::options::{
+    BOUNDARY_DEGREES, BoundaryEnergy, BoundaryOptions, CurveForm, TorsionHandle,
 };
-pub use curve::{BezierCurve, CurveJet, CurveQuality};
-pub use data::{AsymptoticNet, CornerData, Curvatures, DATA_DEGREE, NetCurve, NetFace};
+pub use boundary::quad::{Quadrilateral, doubt_signs, solve_quadrilateral};
+pub use boundary::quartic::solve_quartic_quadrilateral;
+pub use boundary::solve::solve_boundary;
+pub use boundary::solved::Boundary;
+pub use curve::bezier::{BezierCurve, CurveJet, CurveQuality};
+pub use data::corners::{AsymptoticNet, CornerData, Curvatures, DATA_DEGREE, NetCurve, NetFace};
 pub use design::{Design, DesignMetrics, DesignOptions, Input, design};
 pub use error::{AsymptoticError, AsymptoticWarning, Place};
 pub use file::{DataFile, FileCurve, TorsionWish, torsion_handles};
-pub use fill::MAX_SURFACE_DEGREE;
-pub use gridshell::{Gridshell, GridshellCheck, GridshellOptions, JoinCheck, fill_net};
-pub use joint::Joins;
-pub use lamella::{Lamella, LamellaNode, LamellaOptions, StripLayout, lamellas, strip_layout};
-pub use mask::Interior;
-pub use patch::{Ansatz, FilledPatch, PatchBoundary, PatchOptions, fill_patch};
-pub use quad::{Quadrilateral, doubt_signs, solve_quadrilateral};
-pub use quartic::solve_quartic_quadrilateral;
-pub use relax::{RelaxOptions, Relaxed, relax, relax_patch};
-pub use surface::{Patch, PatchJet};
-pub use verify::PatchCheck;
+pub use lamella::layout::{StripLayout, strip_layout};
+pub use lamella::strip::{Lamella, LamellaNode, LamellaOptions, lamellas};
+pub use patch::mask::Interior;
+pub use patch::options::{Ansatz, PatchOptions};
+pub use patch::solve::{FilledPatch, fill_patch};
+pub use patch::surface::{Patch, PatchJet};
+pub use patch::thin_plate::MAX_SURFACE_DEGREE;
+pub use patch::verify::PatchCheck;
+pub use relax::relaxed::{RelaxOptions, Relaxed, relax, relax_patch};
+pub use shell::gridshell::{Gridshell, GridshellCheck, GridshellOptions, JoinCheck, fill_net};
+pub use shell::joint::Joins;

@@ -49,3 +49,8 @@ impl fmt::Display for Failure {
         f.write_str(&words.join(" "))
     }
 }
+
+/// A view that was refused is a slip of ours, not of the user.
+pub(crate) fn refused(error: report::ReportError) -> Failure {
+    Failure::other(format!("cannot draw the result: {error}"))
+}

@@ -20,7 +20,7 @@ pub(crate) mod weingarten;
 
 use crate::args::ReportArgs;
 use crate::context::Context;
-use crate::failure::Failure;
+use crate::failure::{Failure, refused};
 use crate::outcome::{Outcome, Status};
 use crate::report_support::jets::spline_view;
 use crate::report_support::mesh::mesh_view;
@@ -103,11 +103,6 @@ fn quoted(word: &str) -> String {
     } else {
         format!("'{}'", word.replace('\'', r"'\''"))
     }
-}
-
-/// A view that was refused is a slip of ours, not of the user.
-fn refused(error: report::ReportError) -> Failure {
-    Failure::other(format!("cannot draw the result: {error}"))
 }
 
 #[cfg(test)]

@@ -1,10 +1,11 @@
 //! Minimisation on one level: L-BFGS with several metrics, Gauss-Newton, linear conditions.
 
 use crate::constraints::{LinearRow, Pull};
+use crate::element::Mixture;
 use crate::evaluator::{SurfaceEnergy, Workspace};
 use crate::freedom::Freedom;
 use crate::functional::{Energy, ROOT_EPSILON};
-use crate::metric::{MetricAssembly, Mixture};
+use crate::metric::MetricAssembly;
 use gp_solver::{LbfgsOptions, Metric, Progress, SolverError, Stage, Status, lbfgs};
 use std::ops::ControlFlow;
 

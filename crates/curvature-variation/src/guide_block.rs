@@ -1,7 +1,7 @@
 //! What a wide blend adds to a Gauss-Newton matrix.
 
+use crate::element::element_width;
 use crate::evaluator::{Group, SurfaceEnergy};
-use crate::metric::element_width;
 use rayon::prelude::*;
 use std::collections::{BTreeMap, HashMap};
 use subdiv_catmull_clark::GuideSector;

@@ -3,10 +3,11 @@
 //! kernels but the basis weights, so agreement of derivatives checks every adjoint.
 
 use crate::density::GUARD;
+use crate::element::Mixture;
 use crate::evaluator::{SurfaceEnergy, Workspace, flatten};
 use crate::freedom::Freedom;
 use crate::functional::{Energy, Functional, ROOT_EPSILON};
-use crate::metric::{MetricAssembly, Mixture};
+use crate::metric::MetricAssembly;
 use crate::rules::{Quadrature, gauss_legendre, quartered};
 use crate::symmetry::SymmetryGroup;
 use fixtures::quad_graphs;

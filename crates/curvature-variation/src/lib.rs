@@ -26,6 +26,7 @@ mod constraints;
 mod density;
 mod descent;
 mod discrete;
+mod element;
 mod evaluator;
 mod expression;
 mod fair;

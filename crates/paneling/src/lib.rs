@@ -18,37 +18,24 @@
 //! # Ok::<(), paneling::PanelingError>(())
 //! ```
 
-mod clustering;
 mod error;
 mod fit;
 mod layout;
-mod measure;
 mod mold;
-mod mold_step;
-mod normal;
-mod outline;
 mod output;
 mod paneling;
-mod panels;
-mod polygon;
-mod prices;
-mod residuals;
-mod retraction;
-mod seam_step;
-mod seam_system;
+mod seam;
 mod search;
 mod small;
-mod taylor;
-mod torus_start;
 
-pub use clustering::DiagramAxis;
 pub use error::PanelingError;
-pub use layout::{Layout, MAX_PANELS, Pattern};
-pub use measure::{Measures, SeamMeasure, Spread};
-pub use mold::{Mold, MoldType};
-pub use outline::{Bend, FlatPanel, FlatSheets};
-pub use output::{PanelMesh, PanelRow};
+pub use fit::clustering::DiagramAxis;
+pub use layout::panels::{PanelSet, Pose, SEAM_SAMPLES, Seam};
+pub use layout::tiling::{Layout, MAX_PANELS, Pattern};
+pub use mold::prices::{Price, PriceList};
+pub use mold::shape::{Mold, MoldType};
+pub use output::outline::{Bend, FlatPanel, FlatSheets};
+pub use output::workshop::{PanelMesh, PanelRow};
 pub use paneling::{Clustering, Options, Paneling, mold_count, panel};
-pub use panels::{PanelSet, Pose, SEAM_SAMPLES, Seam};
-pub use prices::{Price, PriceList};
+pub use seam::measure::{Measures, SeamMeasure, Spread};
 pub use search::{Bounded, Bounds, panel_within};

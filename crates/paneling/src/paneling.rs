@@ -1,13 +1,14 @@
 //! From a set of panels to molds, poses and measures.
 
-use crate::clustering::{self, Clusters, DiagramAxis, Feature};
 use crate::error::PanelingError;
-use crate::fit::Fit;
-use crate::measure::{Measures, measure};
-use crate::mold::{Mold, MoldType};
-use crate::panels::{PanelSet, Pose};
-use crate::prices::PriceList;
-use crate::seam_step::{self, SeamOptions};
+use crate::fit::clustering::{self, Clusters, DiagramAxis, Feature};
+use crate::fit::state::Fit;
+use crate::layout::panels::{PanelSet, Pose};
+use crate::mold::prices::PriceList;
+use crate::mold::shape::{Mold, MoldType};
+use crate::seam::measure::{Measures, measure};
+use crate::seam::step as seam_step;
+use crate::seam::system::SeamOptions;
 
 /// How panels are grouped by mold.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -108,7 +109,7 @@ impl Paneling {
     #[must_use]
     pub fn has_settled(&self) -> bool {
         let (history, stall) = if self.seam_history.is_empty() {
-            (&self.fit_history, crate::fit::STALL)
+            (&self.fit_history, crate::fit::alternation::STALL)
         } else {
             (&self.seam_history, SEAM_STALL)
         };

@@ -6,15 +6,15 @@
 //! beyond the bounds more, and once that does not help, molds at such seams get a more general type
 //! or, where there is none, are split in two. The cheapest result within the bounds wins.
 
-use crate::clustering::{self, Feature};
 use crate::error::PanelingError;
-use crate::fit::Fit;
-use crate::measure::{Measures, measure, own_deviation};
-use crate::mold::MoldType;
+use crate::fit::clustering::{self, Feature};
+use crate::fit::state::Fit;
+use crate::layout::panels::PanelSet;
+use crate::mold::prices::PriceList;
+use crate::mold::shape::MoldType;
 use crate::paneling::{Options, Paneling, cluster, finish};
-use crate::panels::PanelSet;
-use crate::prices::PriceList;
-use crate::seam_step;
+use crate::seam::measure::{Measures, measure, own_deviation};
+use crate::seam::step as seam_step;
 
 /// What is allowed at a seam.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -293,8 +293,8 @@ impl Search<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::clustering::Clusters;
-    use crate::prices::Price;
+    use crate::fit::clustering::Clusters;
+    use crate::mold::prices::Price;
     use crate::{Layout, Pattern};
     use fixtures::surfaces::Shape;
 

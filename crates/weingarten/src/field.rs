@@ -4,9 +4,10 @@ use glam::DVec3;
 use pulp::Simd;
 use rayon::prelude::*;
 
-use crate::grid::{LaneKernel, SampleGrid, Scratch, store};
+use crate::grid::SampleGrid;
 use crate::kernel::{CurvatureJet, FIRST, FOURTH, Field, THIRD, curvature_jet, parallel_jet};
 use crate::real::{Lanes, Triple};
+use crate::sweep::{LaneKernel, Scratch, store};
 
 /// What the surface is like at one sample.
 #[derive(Clone, Copy, Debug)]

@@ -40,6 +40,7 @@ mod options;
 mod rational;
 mod real;
 mod relation;
+mod sweep;
 mod target;
 mod tensor;
 #[cfg(test)]

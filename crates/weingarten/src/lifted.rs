@@ -19,12 +19,13 @@ use rayon::prelude::*;
 
 use crate::blocks::{Fairness, Shape};
 use crate::error::WeingartenError;
-use crate::grid::{LaneKernel, SampleGrid, Scratch, split_runs, store};
+use crate::grid::{SampleGrid, split_runs};
 use crate::kernel::SECOND;
 use crate::level::{LAST_ITERATE_WEIGHT, Level, add_border, net, regular_samples};
 use crate::metrics::coordinates;
 use crate::options::WeingartenOptions;
 use crate::real::{Lanes, Triple};
+use crate::sweep::{LaneKernel, Scratch, store};
 
 /// Auxiliary variables of a sample.
 const AUXILIARY: usize = 12;

@@ -3,9 +3,9 @@
 use geom_core::DVec3;
 use gp_solver::{Elements, Options as SolverOptions, Problem, ResidualBlock, solve};
 
-use crate::bernstein::{derivative, eval};
-use crate::data::{AsymptoticNet, DATA_DEGREE};
-use crate::vertex::VertexFrame;
+use crate::curve::bernstein::{derivative, eval};
+use crate::data::corners::{AsymptoticNet, DATA_DEGREE};
+use crate::data::vertex::VertexFrame;
 
 /// Unknowns of a vertex: two tilts of its normal, and its torsion times the size of the net's
 /// median curve.
@@ -465,7 +465,7 @@ impl ResidualBlock for Rows<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::vertex::{PLANE_TOL, vertex_frames};
+    use crate::data::vertex::{PLANE_TOL, vertex_frames};
 
     #[test]
     fn jacobian_matches_central_differences() {

@@ -1,7 +1,6 @@
 //! Views of smooth surfaces, sampled with their exact normals and curvatures.
 
-use super::refused;
-use crate::failure::Failure;
+use crate::failure::{Failure, refused};
 use bspline::{BsplineSurface, KnotVector};
 use geom_core::{DVec2, DVec3, SurfaceJet, asymptotic_directions, principal_curvatures};
 use report::{FaceGroups, LineRole, LineSet, ScalarField, SurfaceView};

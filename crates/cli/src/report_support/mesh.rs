@@ -1,7 +1,6 @@
 //! Views of meshes: flat faces or smooth vertex normals, with the fields and groups they carry.
 
-use super::refused;
-use crate::failure::Failure;
+use crate::failure::{Failure, refused};
 use exchange::Mesh;
 use geom_core::{DVec3, TriMesh, VertexCurvature, vertex_curvatures};
 use report::{FaceGroups, LineRole, LineSet, ScalarField, SurfaceView};

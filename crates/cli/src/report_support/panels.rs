@@ -1,7 +1,6 @@
 //! Views, histograms and the seam table of a paneling.
 
-use super::refused;
-use crate::failure::Failure;
+use crate::failure::{Failure, refused};
 use paneling::{PanelSet, Paneling};
 use report::{
     FaceGroups, Histogram, LineRole, LineSet, Report, ScalarField, Seam, SeamTable, Series,

@@ -7,9 +7,10 @@ use pulp::Simd;
 
 use super::rows::{RowValues, SampleTerm, fill};
 use crate::field::{Sample, determinants_into};
-use crate::grid::{LaneKernel, SampleGrid, Scratch, load, store};
+use crate::grid::SampleGrid;
 use crate::kernel::{THIRD, alignment, curvature_jet};
 use crate::real::{Lanes, Triple};
+use crate::sweep::{LaneKernel, Scratch, load, store};
 
 /// Least value of the residual scale `q₀` as a fraction of `κ⁵`, `κ` the mean absolute principal
 /// curvature. On surfaces where `H` or `K` is constant the scale is all rounding, and dividing by

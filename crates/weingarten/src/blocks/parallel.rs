@@ -8,9 +8,10 @@ use pulp::Simd;
 use super::alignment::{SCALE_FLOOR, padded, store_gradient};
 use super::rows::{RowValues, SampleTerm, fill};
 use crate::field::{Sample, parallel_gradients};
-use crate::grid::{LaneKernel, SampleGrid, Scratch, load, store};
+use crate::grid::SampleGrid;
 use crate::kernel::{FOURTH, Field, parallel, parallel_jet};
 use crate::real::{Lanes, Triple};
+use crate::sweep::{LaneKernel, Scratch, load, store};
 
 /// One row per sample, `w (ψ_u f_v − ψ_v f_u) / (√Δ p₀)` with `ψ = |∇_s f|²` and `f` one of the
 /// curvatures (Pellis et al. 2021, Eq. 8, with exact fourth derivatives).

@@ -8,9 +8,10 @@ use pulp::Simd;
 use super::alignment::store_gradient;
 use super::rows::{RowValues, SampleTerm, fill};
 use crate::field::{Sample, samples};
-use crate::grid::{LaneKernel, SampleGrid, Scratch, load, store};
+use crate::grid::SampleGrid;
 use crate::kernel::{SECOND, curvature, second};
 use crate::real::{Lanes, Real, Triple};
+use crate::sweep::{LaneKernel, Scratch, load, store};
 use crate::target::Target;
 
 /// One row per sample, `w (α H + β K + γ)`, with coefficients that a [`Target`] updates from the

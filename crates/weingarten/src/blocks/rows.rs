@@ -4,7 +4,8 @@
 use gp_solver::Elements;
 use rayon::prelude::*;
 
-use crate::grid::{SampleGrid, Scratch, split_runs};
+use crate::grid::{SampleGrid, split_runs};
+use crate::sweep::Scratch;
 
 /// Where the values of one row of samples go.
 pub(crate) struct RowValues<'a> {

@@ -1,0 +1,151 @@
+//! The rows of a net of curves from normals: fairness of every curve, and what has to hold exactly.
+
+use gp_solver::{Elements, ResidualBlock};
+use rayon::prelude::*;
+
+use crate::boundary::normals::curve::{COLUMNS, Continuation, FAIR_ROWS, NormalCurve};
+
+fn gather(x: &[f64], columns: &[usize]) -> [f64; COLUMNS] {
+    std::array::from_fn(|k| x[columns[k]])
+}
+
+/// [`NormalCurve::fairness`] of all curves.
+pub(crate) struct Fairness<'a> {
+    curves: &'a [NormalCurve],
+    elements: Elements,
+}
+
+impl<'a> Fairness<'a> {
+    pub(crate) fn new(curves: &'a [NormalCurve], columns: &[[usize; COLUMNS]]) -> Self {
+        let mut elements = Elements::new();
+        columns.iter().for_each(|c| elements.push(c, FAIR_ROWS));
+        Self { curves, elements }
+    }
+}
+
+impl ResidualBlock for Fairness<'_> {
+    fn name(&self) -> &str {
+        "fairness"
+    }
+
+    fn elements(&self) -> &Elements {
+        &self.elements
+    }
+
+    fn residuals(&self, x: &[f64], residuals: &mut [f64]) {
+        let each = residuals.par_chunks_exact_mut(FAIR_ROWS).zip(self.curves).enumerate();
+        each.for_each(|(e, (out, curve))| {
+            curve.fairness(&gather(x, self.elements.columns(e)), out, None);
+        });
+    }
+
+    fn linearize(&self, x: &[f64], residuals: &mut [f64], jacobian: &mut [f64]) {
+        let jacobians = jacobian.par_chunks_exact_mut(FAIR_ROWS * COLUMNS);
+        let rows = residuals.par_chunks_exact_mut(FAIR_ROWS).zip(jacobians);
+        rows.zip(self.curves).enumerate().for_each(|(e, ((out, jacobian), curve))| {
+            curve.fairness(&gather(x, self.elements.columns(e)), out, Some(jacobian));
+        });
+    }
+}
+
+/// [`NormalCurve::exactness`] of all curves, then [`Continuation::jump`] of all lines.
+pub(crate) struct Exactness<'a> {
+    curves: &'a [NormalCurve],
+    columns: &'a [[usize; COLUMNS]],
+    continued: &'a [[(usize, usize); 2]],
+    /// For each continuation, which of its columns the second curve's unknowns are.
+    second: Vec<[usize; COLUMNS]>,
+    elements: Elements,
+    weight: f64,
+    /// Added to every row: the multiplier over the square of the weight.
+    shift: Vec<f64>,
+}
+
+impl<'a> Exactness<'a> {
+    pub(crate) fn new(
+        curves: &'a [NormalCurve],
+        columns: &'a [[usize; COLUMNS]],
+        continued: &'a [[(usize, usize); 2]],
+    ) -> Self {
+        let mut elements = Elements::new();
+        for (curve, columns) in curves.iter().zip(columns) {
+            elements.push(columns, curve.exact_rows());
+        }
+        let mut second = Vec::with_capacity(continued.len());
+        for [(a, _), (b, _)] in continued {
+            let mut all = columns[*a].to_vec();
+            second.push(columns[*b].map(|c| {
+                all.iter().position(|known| *known == c).unwrap_or_else(|| {
+                    all.push(c);
+                    all.len() - 1
+                })
+            }));
+            elements.push(&all, 1);
+        }
+        let shift = vec![0.0; elements.rows_total()];
+        Self { curves, columns, continued, second, elements, weight: 1.0, shift }
+    }
+
+    /// The method of multipliers: what the last weight left at `x` sets the multipliers, so
+    /// that the next solve leaves far less of it.
+    pub(crate) fn reweight(&mut self, weight: f64, x: &[f64]) {
+        if self.weight != 1.0 {
+            let mut rows = vec![0.0; self.shift.len()];
+            self.residuals(x, &mut rows);
+            let share = self.weight / (weight * weight);
+            self.shift = rows.iter().map(|r| share * r).collect();
+        }
+        self.weight = weight;
+    }
+
+    /// The bare equations.
+    pub(crate) fn release(&mut self) {
+        self.weight = 1.0;
+        self.shift.fill(0.0);
+    }
+
+    fn fill(&self, x: &[f64], residuals: &mut [f64], mut jacobian: Option<&mut [f64]>) {
+        let unknowns = |i: usize| gather(x, &self.columns[i]);
+        for (e, curve) in self.curves.iter().enumerate() {
+            let range = self.elements.jacobian_range(e);
+            let slopes = jacobian.as_deref_mut().map(|j| &mut j[range]);
+            curve.exactness(&unknowns(e), &mut residuals[self.elements.rows(e)], slopes);
+        }
+        for (k, [(a, e), (b, f)]) in self.continued.iter().enumerate() {
+            let element = self.curves.len() + k;
+            let lines = Continuation { curves: [(&self.curves[*a], *e), (&self.curves[*b], *f)] };
+            let mut slopes = [[0.0; COLUMNS]; 2];
+            let wanted = jacobian.is_some().then_some(&mut slopes);
+            let row = self.elements.rows(element).start;
+            residuals[row] = lines.jump([&unknowns(*a), &unknowns(*b)], wanted);
+            if let Some(jacobian) = jacobian.as_deref_mut() {
+                let out = &mut jacobian[self.elements.jacobian_range(element)];
+                out.fill(0.0);
+                out[..COLUMNS].copy_from_slice(&slopes[0]);
+                for (place, slope) in self.second[k].iter().zip(slopes[1]) {
+                    out[*place] += slope;
+                }
+            }
+        }
+        residuals.iter_mut().zip(&self.shift).for_each(|(r, shift)| *r += shift);
+        residuals.iter_mut().chain(jacobian.into_iter().flatten()).for_each(|r| *r *= self.weight);
+    }
+}
+
+impl ResidualBlock for Exactness<'_> {
+    fn name(&self) -> &str {
+        "closing"
+    }
+
+    fn elements(&self) -> &Elements {
+        &self.elements
+    }
+
+    fn residuals(&self, x: &[f64], residuals: &mut [f64]) {
+        self.fill(x, residuals, None);
+    }
+
+    fn linearize(&self, x: &[f64], residuals: &mut [f64], jacobian: &mut [f64]) {
+        self.fill(x, residuals, Some(jacobian));
+    }
+}

@@ -1,0 +1,4 @@
+//! Whole nets filled with patches that join with a common tangent plane, one by one or all at once.
+
+pub(crate) mod gridshell;
+pub(crate) mod joint;

@@ -1,0 +1,119 @@
+//! One mold and the poses of all its panels, moved together.
+//!
+//! The alternation creeps where a change of the mold can nearly be undone by the poses. Here both
+//! move in one damped Gauss-Newton step. Poses of different panels do not meet in any residual, so
+//! they are eliminated panel by panel and a system in the mold's parameters remains.
+
+use crate::fit::normal::{Matrix, Row, design_block};
+use crate::fit::residuals::{POSE, panel_energy};
+use crate::fit::retraction::moved_on;
+use crate::fit::state::Fit;
+use crate::layout::panels::{PanelSet, Pose};
+use crate::mold::shape::{MAX_PARAMETERS, Mold};
+use crate::small::{factor, solve_factored};
+use rayon::prelude::*;
+
+/// Tries per step; damping grows tenfold from one to the next.
+const TRIES: usize = 4;
+/// Damping to start with, a share of the diagonal.
+pub(crate) const FIRST_DAMPING: f64 = 1e-3;
+const LEAST_DAMPING: f64 = 1e-9;
+/// Share of the mean of a pose's diagonal that is always added to it.
+const FREE: f64 = 1e-12;
+
+/// A mold and its panels after a step.
+pub(crate) struct Moved {
+    pub(crate) mold: Mold,
+    /// Pose and energy of each panel of the mold.
+    pub(crate) panels: Vec<(Pose, f64)>,
+}
+
+/// A step of mold `m` that lowers the energy of its panels, or `None` if none was found.
+pub(crate) fn step(set: &PanelSet, fit: &Fit, m: usize, damping: &mut f64) -> Option<Moved> {
+    let members = &fit.members[m];
+    let mold = &fit.molds[m];
+    let before: f64 = members.iter().map(|&p| fit.energies[p]).sum();
+    let blocks: Vec<(Matrix, Row)> = members
+        .par_iter()
+        .with_min_len(32)
+        .map_init(Vec::new, |rows, &p| {
+            design_block(set, p, mold, &fit.poses[p], fit.slope_weight, rows)
+        })
+        .collect();
+    for _ in 0..TRIES {
+        let (change, changes) = solve(&blocks, *damping);
+        let mut trial = *mold;
+        trial.parameters.iter_mut().zip(change).for_each(|(p, s)| *p += s);
+        let panels: Vec<(Pose, f64)> = members
+            .par_iter()
+            .with_min_len(32)
+            .zip(&changes)
+            .map(|(&p, change)| {
+                let pose = moved_on(set, p, &fit.poses[p], change, mold, &trial);
+                let (points, normals) = set.panel_samples(p);
+                (pose, panel_energy(&trial, fit.slope_weight, &pose, points, normals))
+            })
+            .collect();
+        // NaN, a panel beyond the reach of a round mold, is refused too.
+        if panels.iter().map(|p| p.1).sum::<f64>() < before {
+            *damping = (0.1 * *damping).max(LEAST_DAMPING);
+            return Some(Moved { mold: trial, panels });
+        }
+        *damping *= 10.0;
+    }
+    None
+}
+
+/// The damped step of the mold and of every pose.
+fn solve(blocks: &[(Matrix, Row)], damping: f64) -> ([f64; MAX_PARAMETERS], Vec<[f64; POSE]>) {
+    // Per panel: the factored pose block, and pose block⁻¹ · cross, a column per mold parameter.
+    let eliminated: Vec<_> = blocks
+        .par_iter()
+        .with_min_len(64)
+        .map(|(block, _)| {
+            let mut pose = [[0.0; POSE]; POSE];
+            pose.iter_mut().zip(block).for_each(|(p, b)| p.copy_from_slice(&b[..POSE]));
+            let mean = (0..POSE).map(|i| pose[i][i]).sum::<f64>() / POSE as f64;
+            // Each by its own size, for a slide changes much less than a lift; and a little of the
+            // mean, for a plane is free to slide and a sphere to turn.
+            for (i, row) in pose.iter_mut().enumerate() {
+                row[i] += damping * row[i] + FREE * mean;
+            }
+            factor(&mut pose);
+            let mut through = [[0.0; POSE]; MAX_PARAMETERS];
+            for (column, cross) in through.iter_mut().zip(&block[POSE..]) {
+                column.copy_from_slice(&cross[..POSE]);
+                solve_factored(&pose, column);
+            }
+            (pose, through)
+        })
+        .collect();
+    let mut matrix = [[0.0; MAX_PARAMETERS]; MAX_PARAMETERS];
+    let mut change = [0.0; MAX_PARAMETERS];
+    for ((block, side), (_, through)) in blocks.iter().zip(&eliminated) {
+        for i in 0..MAX_PARAMETERS {
+            for j in 0..=i {
+                matrix[i][j] += block[POSE + i][POSE + j] - dot(&block[POSE + i], &through[j]);
+            }
+            matrix[i][i] += damping * block[POSE + i][POSE + i];
+            change[i] += side[POSE + i] - dot(side, &through[i]);
+        }
+    }
+    factor(&mut matrix);
+    solve_factored(&matrix, &mut change);
+    let poses = blocks.iter().zip(&eliminated).map(|((block, side), (pose, _))| {
+        let mut out = [0.0; POSE];
+        out.copy_from_slice(&side[..POSE]);
+        for (cross, change) in block[POSE..].iter().zip(change) {
+            out.iter_mut().zip(cross).for_each(|(o, c)| *o -= c * change);
+        }
+        solve_factored(pose, &mut out);
+        out
+    });
+    (change, poses.collect())
+}
+
+/// The product of the pose part of a row with a pose.
+fn dot(row: &Row, pose: &[f64; POSE]) -> f64 {
+    row.iter().zip(pose).map(|(x, y)| x * y).sum()
+}

@@ -1,0 +1,5 @@
+//! The shapes of molds, and what molds and panels cost.
+
+pub(crate) mod prices;
+pub(crate) mod shape;
+pub(crate) mod taylor;

@@ -1,0 +1,84 @@
+//! What molds and panels cost.
+
+use crate::error::PanelingError;
+use crate::mold::shape::MoldType;
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
+
+/// Price of one type of mold and of a panel made on it, in any currency.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Price {
+    /// Making the mold.
+    pub mold: f64,
+    /// Making one panel on it.
+    pub panel: f64,
+}
+
+/// Prices by type of mold (Eigensatz et al. 2010, Sec. 3: a mold is paid once, a panel each time).
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(transparent)]
+pub struct PriceList {
+    prices: BTreeMap<MoldType, Price>,
+}
+
+impl PriceList {
+    /// A list with these types.
+    #[must_use]
+    pub fn new(prices: impl IntoIterator<Item = (MoldType, Price)>) -> Self {
+        Self { prices: prices.into_iter().collect() }
+    }
+
+    /// Every mold costs 1 and panels nothing: the total cost is the number of molds.
+    #[must_use]
+    pub fn counting_molds() -> Self {
+        let price = Price { mold: 1.0, panel: 0.0 };
+        Self::new(MoldType::ALL.map(|kind| (kind, price)))
+    }
+
+    /// Checks that every one of `types` has a usable price.
+    ///
+    /// # Errors
+    /// [`PanelingError::NoPrice`] or [`PanelingError::BadPrice`] names the type.
+    pub fn check(&self, types: &[MoldType]) -> Result<(), PanelingError> {
+        for kind in types {
+            let price =
+                self.prices.get(kind).ok_or(PanelingError::NoPrice { kind: kind.name() })?;
+            for value in [price.mold, price.panel] {
+                if !(value >= 0.0 && value.is_finite()) {
+                    return Err(PanelingError::BadPrice { kind: kind.name(), value });
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// Cost of one mold of a type and `panels` panels on it; infinite for a type without price.
+    #[must_use]
+    pub fn cost(&self, kind: MoldType, panels: usize) -> f64 {
+        self.prices.get(&kind).map_or(f64::INFINITY, |p| p.mold + panels as f64 * p.panel)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn prices_are_checked_by_type() {
+        let mut list = PriceList::counting_molds();
+        assert_eq!(list.cost(MoldType::Cubic, 10), 1.0);
+        list.check(&MoldType::ALL).unwrap();
+        list.prices.insert(MoldType::Plane, Price { mold: f64::NAN, panel: 0.0 });
+        list.prices.remove(&MoldType::Torus);
+        assert!(matches!(
+            list.check(&[MoldType::Plane]),
+            Err(PanelingError::BadPrice { kind: "plane", .. })
+        ));
+        let error = list.check(&[MoldType::Cubic, MoldType::Torus]).unwrap_err();
+        assert_eq!(
+            error.to_string(),
+            "the price list has no entry for torus; add it or leave that type out"
+        );
+    }
+}
