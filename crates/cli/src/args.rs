@@ -93,6 +93,14 @@ pub(crate) struct CheckpointArgs {
     pub(crate) resume: Option<PathBuf>,
 }
 
+/// `--dump-system`, for methods that linearise.
+#[derive(Debug, clap::Args)]
+pub(crate) struct SystemArgs {
+    /// Write the linearised system of every stage into this existing folder (Matrix Market)
+    #[arg(long, value_name = "DIR")]
+    pub(crate) dump_system: Option<PathBuf>,
+}
+
 /// `--require-converged`, for iterative commands.
 #[derive(Debug, clap::Args)]
 pub(crate) struct ConvergedArgs {

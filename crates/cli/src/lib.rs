@@ -11,10 +11,12 @@ mod context;
 mod failure;
 mod net_files;
 mod net_report;
+mod option_flags;
 mod outcome;
 mod panel_files;
 mod report_support;
 mod surface_file;
+mod watch;
 
 use clap::{CommandFactory, Parser};
 use context::Context;

@@ -37,10 +37,10 @@
 //! ```
 
 mod block;
+mod blocks;
 mod check;
 mod checkpoint;
 mod clock;
-mod closeness;
 mod damping;
 mod elements;
 mod error;
@@ -62,9 +62,9 @@ mod trust_region;
 mod variables;
 
 pub use block::{EnergyBlock, ResidualBlock};
+pub use blocks::{Closeness, NumericBlock};
 pub use check::{DerivativeCheck, check_gradient, check_jacobian};
 pub use checkpoint::{Checkpoint, Fingerprint};
-pub use closeness::Closeness;
 pub use damping::DampingRule;
 pub use elements::Elements;
 pub use error::{Quantity, SolverError};

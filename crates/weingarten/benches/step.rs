@@ -9,7 +9,8 @@ use std::time::Duration;
 use bspline::BsplineSurface;
 use criterion::{Criterion, criterion_group, criterion_main};
 use fixtures::surfaces::Shape;
-use weingarten::{Formulation, WeingartenOptions, optimize};
+use gp_solver::Counts;
+use weingarten::{Formulation, Options, solve};
 
 /// Row, control points, samples.
 const ROWS: [(&str, [usize; 2], (usize, usize)); 5] = [
@@ -19,6 +20,10 @@ const ROWS: [(&str, [usize; 2], (usize, usize)); 5] = [
     ("row 8c", [16, 20], (48, 60)),
     ("row 10c, open", [40, 15], (80, 30)),
 ];
+
+fn counts((u, v): (usize, usize)) -> Counts {
+    Counts { u, v }
+}
 
 fn roof([n_u, n_v]: [usize; 2]) -> BsplineSurface {
     Shape::Roof.surface(n_u, n_v, 4, 4)
@@ -35,11 +40,12 @@ fn steps(
 ) -> Duration {
     let iterations = if formulation == Formulation::Reduced { 10 } else { 2 };
     let options =
-        WeingartenOptions { iterations, samples: Some(samples), formulation, ..Default::default() };
+        Options { iterations, samples: Some(counts(samples)), formulation, ..Default::default() };
     (0..iters)
         .map(|_| {
-            let result = optimize(black_box(surface), &options).expect("a surface to optimise");
-            let solver = &result.report.levels[0].solver;
+            let result =
+                solve(black_box(surface), &options, &mut ()).expect("a surface to optimise");
+            let solver = &result.report.stages[0].solver;
             let t = solver.timings;
             let per_trial = (t.factor + t.solve + t.residuals).as_secs_f64();
             let per_iterate = (t.linearize + t.normal).as_secs_f64();
@@ -55,9 +61,8 @@ fn step(criterion: &mut Criterion) {
     let mut group = criterion.benchmark_group("reduced step");
     group.sample_size(20);
     for (row, net, samples) in ROWS {
-        let start =
-            WeingartenOptions { iterations: 3, samples: Some(samples), ..Default::default() };
-        let surface = optimize(&roof(net), &start).expect("a surface to optimise").surface;
+        let start = Options { iterations: 3, samples: Some(counts(samples)), ..Default::default() };
+        let surface = solve(&roof(net), &start, &mut ()).expect("a surface to optimise").result;
         group.bench_function(row, |b| {
             b.iter_custom(|iters| steps(&surface, samples, Formulation::Reduced, iters));
         });
@@ -73,14 +78,14 @@ fn step(criterion: &mut Criterion) {
 }
 
 fn levels(criterion: &mut Criterion) {
-    let options = WeingartenOptions {
-        levels: vec![(10, 8), (14, 10), (18, 14), (25, 18)],
+    let options = Options {
+        levels: [(10, 8), (14, 10), (18, 14), (25, 18)].into_iter().map(counts).collect(),
         ..Default::default()
     };
     let surface = roof([14, 14]);
     let mut group = criterion.benchmark_group("roof over four levels");
     group.sample_size(10);
-    group.bench_function("40 steps", |b| b.iter(|| optimize(black_box(&surface), &options)));
+    group.bench_function("40 steps", |b| b.iter(|| solve(black_box(&surface), &options, &mut ())));
     group.finish();
 }
 

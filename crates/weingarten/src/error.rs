@@ -7,7 +7,7 @@ use gp_solver::SolverError;
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 #[expect(missing_docs, reason = "the messages spell out every field")]
-pub enum WeingartenError {
+pub enum Error {
     /// A pole, a cusp or a collapsed edge.
     #[error(
         "the surface is pinched at u = {u}, v = {v}: its tangents vanish or are parallel there; \
@@ -24,10 +24,10 @@ pub enum WeingartenError {
     #[error("{count} {what} are more than the {limit} that are supported; ask for fewer")]
     TooMany { what: &'static str, count: usize, limit: usize },
     /// A weight or coefficient that makes no sense.
-    #[error("option {name} is {value}; it must be {need}")]
+    #[error("`{name}` is {value}; it must be {need}")]
     BadOption { name: &'static str, value: f64, need: &'static str },
     /// A relation that cannot be set up.
-    #[error("the curve of the curvature relation has {found} control points; give at least 2")]
+    #[error("the curve of `relation` has {found} control points; give at least 2")]
     ShortCurve { found: usize },
     /// A control point to move that is not there.
     #[error("control point ({i}, {j}) cannot be moved: the net has {n_u} x {n_v}, counted from 0")]
@@ -39,11 +39,8 @@ pub enum WeingartenError {
     )]
     NotClamped { direction: &'static str },
     /// A combination that does not exist.
-    #[error("{what} needs the reduced formulation; drop `formulation: lifted`")]
+    #[error("{what} needs the reduced formulation; leave `formulation` at reduced")]
     NeedsReduced { what: &'static str },
-    /// A checkpoint of another problem.
-    #[error("the checkpoint belongs to {what}; resume with the input and options it was made with")]
-    ForeignCheckpoint { what: &'static str },
     /// A level that cannot be fitted.
     #[error("level {level}: {source}")]
     Level { level: String, source: FitError },

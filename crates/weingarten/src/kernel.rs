@@ -245,8 +245,10 @@ fn add_shifted<T: Real, const N: usize>(
 
 /// Which curvature the isolines belong to.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Field {
+pub enum Field {
+    /// Mean curvature.
     Mean,
+    /// Gaussian curvature.
     Gauss,
 }
 

@@ -3,18 +3,18 @@
 use std::sync::Arc;
 
 use bspline::BsplineSurface;
-use geom_core::FirstForm;
-use gp_solver::{Closeness, DampingRule, Observer, Options, Problem, Report, Run, Stage, System};
+use gp_solver::{Closeness, DampingRule, Extra, Options as SolverOptions, Problem, Stage};
 
-use crate::blocks::{
-    Alignment, BorderGlide, Fairness, Net, Parallel, RelationRows, Shape, border_points,
-};
-use crate::error::WeingartenError;
-use crate::field::{Sample, samples};
+use crate::blocks::{Alignment, BorderGlide, Fairness, Net, Parallel, RelationRows, Shape};
+use crate::error::Error;
 use crate::grid::SampleGrid;
 use crate::kernel::Field;
-use crate::options::{Border, WeingartenOptions};
+use crate::lifted;
+use crate::options::{Border, Formulation, Options};
+use crate::sampled::{SampledSurface, regular_samples};
+use crate::schedule::{curvature_size, sample_counts};
 use crate::target::Target;
+use crate::variables::{control_points, coordinates, variables};
 
 /// Weight of gliding borders against distances on the working scale: large enough that the border
 /// stays on its curve to some 1e-4 of the size of the surface.
@@ -26,6 +26,8 @@ pub(crate) const LAST_ITERATE_WEIGHT: f64 = 1e-3;
 const ROUNDING_RMS: f64 = 1e-8;
 /// Converged if the largest cosine between the residual and a column of the Jacobian is below.
 const GRADIENT_TOL: f64 = 1e-9;
+/// Converged if a step is below this share of the unknowns.
+const STEP_TOL: f64 = 1e-10;
 
 /// Everything a level is made from, on the working scale.
 pub(crate) struct Level {
@@ -34,180 +36,150 @@ pub(crate) struct Level {
     pub(crate) grid: Arc<SampleGrid>,
     /// Mean absolute principal curvature, or 1 where nothing is curved.
     pub(crate) curvature: f64,
-    /// Working lengths per length of the model.
-    pub(crate) unit: f64,
+    /// The level's name, number and scale.
+    pub(crate) stage: Stage,
 }
 
-/// The samples of a surface, each checked to be regular.
-pub(crate) fn regular_samples(
-    grid: &SampleGrid,
-    x: &[f64],
-) -> Result<Vec<Sample>, WeingartenError> {
-    let samples = samples(grid, x);
-    let singular = |s: &Sample| {
-        let first = FirstForm { e: s.e, f: s.f, g: s.g };
-        first.check().is_err() || !(s.jet.h_u.is_finite() && s.jet.k_v.is_finite())
-    };
-    match samples.iter().position(singular) {
-        Some(k) => {
-            let [u, v] = grid.parameters(k);
-            Err(WeingartenError::Singular { u, v })
-        }
-        None => Ok(samples),
-    }
-}
-
-/// The shape of the net of a surface.
-pub(crate) fn net(surface: &BsplineSurface) -> Net {
-    Net {
-        n_u: surface.n_u(),
-        n_v: surface.n_v(),
-        closed_u: surface.knots_u().is_periodic(),
-        closed_v: surface.knots_v().is_periodic(),
-    }
+/// A level ready to be solved.
+pub(crate) struct Prepared {
+    pub(crate) problem: Problem<'static>,
+    /// All unknowns at the start.
+    pub(crate) x: Vec<f64>,
+    pub(crate) options: SolverOptions,
 }
 
 impl Level {
-    /// The target of the relation asked for, judged from the start of the level.
-    pub(crate) fn target(&self, options: &WeingartenOptions, start: &[Sample]) -> Option<Target> {
-        Target::new(&options.relation, self.unit, self.curvature, start)
+    /// The level of a reference on the working scale.
+    pub(crate) fn new(
+        reference: BsplineSurface,
+        samples: Option<gp_solver::Counts>,
+        stage: Stage,
+    ) -> Result<Self, Error> {
+        let grid = Arc::new(SampleGrid::uniform(&reference, sample_counts(&reference, samples)));
+        let samples = regular_samples(&grid, &coordinates(&reference))?;
+        let curvature = curvature_size(&reference, &samples)?.unwrap_or(1.0);
+        Ok(Self { reference, grid, curvature, stage })
     }
 
-    /// The problem of the eliminated formulation; `x` is the start and `start` its samples.
+    /// Number of coordinates of control points.
+    pub(crate) fn unknowns(&self) -> usize {
+        self.grid.unknowns()
+    }
+
+    /// The target of the relation asked for, judged from the start of the level.
+    pub(crate) fn target(&self, options: &Options, start: &SampledSurface) -> Option<Target> {
+        Target::new(&options.relation, self.stage.unit, self.curvature, &start.samples)
+    }
+
+    /// A surface of another net as one of this level's.
+    pub(crate) fn refitted(&self, surface: &BsplineSurface) -> Result<BsplineSurface, Error> {
+        surface
+            .refit(self.reference.knots_u(), self.reference.knots_v())
+            .map_err(|source| Error::Level { level: self.stage.name.clone(), source })
+    }
+
+    /// The surface with these coordinates.
+    pub(crate) fn surface(&self, x: &[f64]) -> Result<BsplineSurface, Error> {
+        Ok(self.reference.with_control_points(control_points(x))?)
+    }
+
+    /// Problem, start and settings of the formulation asked for, with the caller's own blocks.
+    /// Scales come from `origin`, where the level begins.
+    pub(crate) fn prepared(
+        &self,
+        options: &Options,
+        origin: &[f64],
+        extra: &mut Extra<'_, Error>,
+    ) -> Result<Prepared, Error> {
+        let mut prepared = match options.formulation {
+            Formulation::Reduced => self.reduced(options, origin)?,
+            Formulation::Lifted => self.lifted(options, origin)?,
+        };
+        let variables = prepared.problem.variables().clone();
+        extra(&self.stage, &variables, &mut prepared.problem)?;
+        Ok(prepared)
+    }
+
+    fn reduced(&self, options: &Options, origin: &[f64]) -> Result<Prepared, Error> {
+        let start = self.sampled(origin)?;
+        let rounding = ROUNDING_RMS * options.alignment_weight().max(LAST_ITERATE_WEIGHT);
+        Ok(Prepared {
+            problem: self.problem(options, &start)?,
+            x: origin.to_vec(),
+            options: SolverOptions {
+                max_iterations: options.iterations,
+                damping_rule: DampingRule::Fivefold,
+                gradient_tol: GRADIENT_TOL,
+                step_tol: STEP_TOL,
+                abs_energy_tol: 0.5 * self.grid.len() as f64 * rounding * rounding,
+                ..SolverOptions::default()
+            },
+        })
+    }
+
+    fn lifted(&self, options: &Options, origin: &[f64]) -> Result<Prepared, Error> {
+        let x = lifted::start(&self.grid, origin)?;
+        Ok(Prepared {
+            problem: lifted::problem(self, options, &x)?,
+            options: SolverOptions {
+                max_iterations: options.iterations,
+                ..SolverOptions::guided_projection(LAST_ITERATE_WEIGHT)
+            },
+            x,
+        })
+    }
+
+    /// The surface with these control points on the grid of the level.
+    pub(crate) fn sampled(&self, x: &[f64]) -> Result<SampledSurface, Error> {
+        SampledSurface::at(&self.grid, x, self.curvature)
+    }
+
+    /// The problem of the eliminated formulation.
     pub(crate) fn problem(
         &self,
-        options: &WeingartenOptions,
-        x: &[f64],
-        start: &[Sample],
-    ) -> Result<Problem<'static>, WeingartenError> {
-        let w = options.effective_weights();
-        let (net, grid) = (net(&self.reference), &self.grid);
-        let reference = crate::metrics::coordinates(&self.reference);
-        let mut problem = Problem::new(grid.unknowns());
+        options: &Options,
+        start: &SampledSurface,
+    ) -> Result<Problem<'static>, Error> {
+        let mut problem = Problem::new(variables(&self.reference, options.border)?);
         match self.target(options, start) {
-            None => problem.add(Alignment::new(grid, start, self.curvature, w.alignment)),
-            Some(target) => problem.add(RelationRows::new(grid, target, start, w.alignment)),
+            None => problem.add(Alignment::new(start, options.alignment_weight())),
+            Some(target) => {
+                problem.add(RelationRows::of_target(start, target, options.alignment_weight()))
+            }
         };
-        if w.parallel > 0.0 {
+        if options.parallel > 0.0 {
             for field in [Field::Mean, Field::Gauss] {
-                problem.add(Parallel::new(grid, field, x, start, self.curvature, w.parallel));
+                problem.add(Parallel::new(start, field, options.parallel));
             }
         }
-        if w.closeness > 0.0 {
-            problem.add(Closeness::new(
-                "closeness",
-                reference.clone(),
-                vec![w.closeness; reference.len()],
-            ));
-        }
-        if w.fairness > 0.0 {
-            problem.add(Fairness::new(net, Some(&reference), w.fairness));
-        }
-        if w.shape > 0.0 {
-            problem.add(Shape::new(net, &reference, w.shape));
-        }
-        add_border(&mut problem, options.border, &self.reference, &reference)?;
-        problem.add(Closeness::to_last_iterate(x, LAST_ITERATE_WEIGHT));
-        problem.variables_mut().set_order(order(
-            net,
-            self.reference.degree_u().get(),
-            self.reference.degree_v().get(),
-        ));
+        let reference = coordinates(&self.reference);
+        self.add_net_terms(&mut problem, options, &reference, Some(&reference));
+        problem.add(Closeness::to_last_iterate(&start.x, LAST_ITERATE_WEIGHT));
         Ok(problem)
     }
 
-    /// Takes up to `iterations` Levenberg-Marquardt steps from `x`. `origin` is where the level
-    /// began: scales come from there, and it differs from `x` only when a solve is resumed.
-    pub(crate) fn solve(
+    /// The terms on the control net that both formulations have; `fair` is what the fairness
+    /// compares with, if not the net itself is to be fair.
+    pub(crate) fn add_net_terms(
         &self,
-        options: &WeingartenOptions,
-        origin: &[f64],
-        x: &mut [f64],
-        iterations: usize,
-        damping: Option<f64>,
-        observer: &mut dyn Observer,
-    ) -> Result<Report, WeingartenError> {
-        let start = regular_samples(&self.grid, origin)?;
-        let system =
-            System::new(self.problem(options, origin, &start)?, gp_solver::Factorization::Auto)?;
-        let rounding =
-            ROUNDING_RMS * options.effective_weights().alignment.max(LAST_ITERATE_WEIGHT);
-        let defaults = Options::default();
-        let solver = Options {
-            max_iterations: iterations,
-            initial_damping: damping.unwrap_or(defaults.initial_damping),
-            damping_rule: DampingRule::Fivefold,
-            gradient_tol: GRADIENT_TOL,
-            step_tol: 1e-10,
-            abs_energy_tol: 0.5 * self.grid.len() as f64 * rounding * rounding,
-            ..defaults
-        };
-        let mut run = Run::new(system, x, &solver)?;
-        let status = run.go_on(&Stage::only(self.name()), observer)?;
-        x.copy_from_slice(run.x());
-        Ok(run.report(status))
-    }
-}
-
-/// Holds the border or lets it glide.
-pub(crate) fn add_border(
-    problem: &mut Problem<'static>,
-    border: Border,
-    surface: &BsplineSurface,
-    reference: &[f64],
-) -> Result<(), WeingartenError> {
-    if border == Border::Free {
-        return Ok(());
-    }
-    for (direction, knots) in [("u", surface.knots_u()), ("v", surface.knots_v())] {
-        if !knots.is_periodic() && !knots.is_clamped() {
-            return Err(WeingartenError::NotClamped { direction });
+        problem: &mut Problem<'static>,
+        options: &Options,
+        reference: &[f64],
+        fair: Option<&[f64]>,
+    ) {
+        let net = Net::of(&self.reference);
+        if options.closeness > 0.0 {
+            let weights = vec![options.closeness; reference.len()];
+            problem.add(Closeness::new("closeness", reference.to_vec(), weights));
+        }
+        if options.fairness > 0.0 {
+            problem.add(Fairness::new(net, fair, options.fairness));
+        }
+        if options.shape > 0.0 {
+            problem.add(Shape::new(net, reference, options.shape));
+        }
+        if options.border == Border::Glide {
+            problem.add(BorderGlide::new(net, reference, BORDER_WEIGHT));
         }
     }
-    let net = net(surface);
-    if border == Border::Glide {
-        problem.add(BorderGlide::new(net, reference, BORDER_WEIGHT));
-        return Ok(());
-    }
-    for control in border_points(net).into_iter().flatten() {
-        for axis in 0..3 {
-            problem.variables_mut().fix_unknown(3 * control + axis);
-        }
-    }
-    Ok(())
-}
-
-/// An ordering of the unknowns that keeps the normal matrix in a narrow band: one side of the net
-/// runs fastest, and a closed slow side is folded (0, n−1, 1, n−2, …), so that its two ends, which
-/// are neighbours, stay near one another.
-fn order(net: Net, degree_u: usize, degree_v: usize) -> Vec<usize> {
-    let Net { n_u, n_v, closed_u, closed_v } = net;
-    // Half bandwidth in control points if this side is the slow one.
-    let band = |degree: usize, closed: bool, fast: usize, fast_degree: usize, fast_closed: bool| {
-        let slow_reach = if closed { 2 * degree } else { degree };
-        slow_reach * fast + if fast_closed { fast } else { fast_degree }
-    };
-    let u_slow = band(degree_u, closed_u, n_v, degree_v, closed_v);
-    let v_slow = band(degree_v, closed_v, n_u, degree_u, closed_u);
-    let folded = |n: usize, closed: bool| -> Vec<usize> {
-        if !closed {
-            return (0..n).collect();
-        }
-        (0..n).map(|k| if k % 2 == 0 { k / 2 } else { n - 1 - k / 2 }).collect()
-    };
-    let mut order = Vec::with_capacity(3 * n_u * n_v);
-    let mut push = |i: usize, j: usize| {
-        let first = 3 * (i * n_v + j);
-        order.extend(first..first + 3);
-    };
-    if u_slow <= v_slow {
-        for i in folded(n_u, closed_u) {
-            (0..n_v).for_each(|j| push(i, j));
-        }
-    } else {
-        for j in folded(n_v, closed_v) {
-            (0..n_u).for_each(|i| push(i, j));
-        }
-    }
-    order
 }

@@ -6,25 +6,27 @@
 //! fewer different curvature elements than a general surface, and panels can share molds
 //! (Pellis et al. 2021).
 //!
-//! [`optimize`] finds such a surface near to a given one. Unknowns are the control points; the
+//! [`solve`] finds such a surface near to a given one. Unknowns are the control points; the
 //! derivatives of `H` and `K` are exact (third derivatives of the spline); steps are damped and
 //! accepted only if they lower the energy. A relation of a given kind ([`Relation`]) can be asked
-//! for instead. The published scheme with auxiliary variables is there to compare with
+//! for instead. [`solve_with`] takes further terms, made of [`blocks`] or written by oneself. The
+//! published scheme with auxiliary variables is there to compare with
 //! ([`Formulation::Lifted`]).
 //!
 //! ```
-//! use weingarten::{WeingartenOptions, optimize};
+//! use gp_solver::Counts;
+//! use weingarten::{Options, solve};
 //! let roof = fixtures::surfaces::Shape::Roof.surface(10, 8, 4, 4);
-//! let options = WeingartenOptions { levels: vec![(10, 8), (14, 10)], ..Default::default() };
-//! let result = optimize(&roof, &options)?;
-//! assert!(result.after.diagram_area < 0.1 && result.before.diagram_area > 0.5);
-//! assert!(result.after.deviation_mean_percent < 1.0);
-//! # Ok::<(), weingarten::WeingartenError>(())
+//! let levels = vec![Counts { u: 10, v: 8 }, Counts { u: 14, v: 10 }];
+//! let options = Options { levels: levels.into(), ..Default::default() };
+//! let solution = solve(&roof, &options, &mut ())?;
+//! assert!(solution.before.diagram_area > 0.5 && solution.metrics.diagram_area < 0.1);
+//! assert!(solution.metrics.deviation_mean_percent < 1.0);
+//! # Ok::<(), weingarten::Error>(())
 //! ```
 
 mod axis;
-mod blocks;
-mod checkpoint;
+pub mod blocks;
 mod curve;
 mod dense;
 mod error;
@@ -35,24 +37,25 @@ mod level;
 mod lifted;
 mod locus;
 mod metrics;
-mod optimize;
 mod options;
 mod rational;
 mod real;
 mod relation;
+mod sampled;
+mod schedule;
+mod solve;
 mod sweep;
 mod target;
 mod tensor;
 #[cfg(test)]
 mod tests;
+mod variables;
 
-pub use checkpoint::Checkpoint;
-pub use error::WeingartenError;
+pub use error::Error;
 pub use gp_solver::Status;
 pub use locus::RelationLocus;
 pub use metrics::Metrics;
-pub use optimize::{
-    LevelReport, Optimized, Progress, WeingartenReport, optimize, optimize_observed,
-};
-pub use options::{Border, Formulation, Move, Weights, WeingartenOptions};
+pub use options::{Border, Formulation, Move, Options};
 pub use relation::Relation;
+pub use solve::{Solution, problem, solve, solve_with};
+pub use variables::{CONTROL_POINTS, variables};

@@ -11,21 +11,18 @@
 
 use std::sync::Arc;
 
-use gp_solver::{
-    Closeness, Elements, Observer, Options, Problem, Progress, QuadraticBuilder,
-    QuadraticConstraints, Report, ResidualBlock, solve_observed,
-};
+use gp_solver::{Elements, Problem, QuadraticBuilder, QuadraticConstraints, ResidualBlock};
 use rayon::prelude::*;
 
-use crate::blocks::{Fairness, Shape};
-use crate::error::WeingartenError;
+use crate::error::Error;
 use crate::grid::{SampleGrid, split_runs};
 use crate::kernel::SECOND;
-use crate::level::{LAST_ITERATE_WEIGHT, Level, add_border, net, regular_samples};
-use crate::metrics::coordinates;
-use crate::options::WeingartenOptions;
+use crate::level::Level;
+use crate::options::Options;
 use crate::real::{Lanes, Triple};
+use crate::sampled::regular_samples;
 use crate::sweep::{LaneKernel, Scratch, store};
+use crate::variables::{bordered, coordinates};
 
 /// Auxiliary variables of a sample.
 const AUXILIARY: usize = 12;
@@ -41,6 +38,7 @@ const K: usize = 10;
 const H: usize = 11;
 
 /// Number of unknowns: `3 n_u n_v + 12 m_u m_v`.
+#[cfg(test)]
 pub(crate) fn unknowns(grid: &SampleGrid) -> usize {
     grid.unknowns() + AUXILIARY * grid.len()
 }
@@ -50,29 +48,8 @@ fn auxiliary(grid: &SampleGrid, sample: usize, which: usize) -> usize {
     grid.unknowns() + AUXILIARY * sample + which
 }
 
-/// Runs undamped guided projection from the control points `x`, which then hold the result.
-pub(crate) fn solve(
-    level: &Level,
-    options: &WeingartenOptions,
-    x: &mut [f64],
-    iterations: usize,
-    observer: &mut dyn Observer,
-) -> Result<Report, WeingartenError> {
-    let mut lifted = start(&level.grid, x)?;
-    let solver =
-        Options { max_iterations: iterations, ..Options::guided_projection(LAST_ITERATE_WEIGHT) };
-    let control = x.len();
-    // The observer sees control points only, as in the other formulation.
-    let problem = problem(level, options, &lifted)?;
-    let report = solve_observed(problem, &mut lifted, &solver, &mut |it: &Progress<'_>| {
-        observer.step(&Progress { x: &it.x[..control], ..*it })
-    })?;
-    x.copy_from_slice(&lifted[..control]);
-    Ok(report)
-}
-
 /// The unknowns with auxiliary variables computed from the surface.
-pub(crate) fn start(grid: &SampleGrid, x: &[f64]) -> Result<Vec<f64>, WeingartenError> {
+pub(crate) fn start(grid: &SampleGrid, x: &[f64]) -> Result<Vec<f64>, Error> {
     regular_samples(grid, x)?;
     let mut all = x.to_vec();
     let unrolled = grid.unroll(x);
@@ -98,32 +75,19 @@ pub(crate) fn start(grid: &SampleGrid, x: &[f64]) -> Result<Vec<f64>, Weingarten
 /// The lifted problem of a level; `x` are all unknowns.
 pub(crate) fn problem(
     level: &Level,
-    options: &WeingartenOptions,
+    options: &Options,
     x: &[f64],
-) -> Result<Problem<'static>, WeingartenError> {
-    let w = options.effective_weights();
-    let (grid, net) = (&level.grid, net(&level.reference));
-    let reference = coordinates(&level.reference);
-    let mut problem = Problem::new(unknowns(grid));
-    problem.add(alignment(grid, w.alignment));
+) -> Result<Problem<'static>, Error> {
+    let grid = &level.grid;
+    let (mut variables, _) = bordered(&level.reference, options.border)?;
+    variables.add("auxiliary", grid.len(), AUXILIARY);
+    // Control points and the auxiliary variables of a sample both come in threes.
+    variables.set_runs(3);
+    let mut problem = Problem::new(variables);
+    problem.add(alignment(grid, options.alignment_weight()));
     problem.add(Definitions::new(grid, x));
     problem.add(curvature_definitions(grid));
-    if w.closeness > 0.0 {
-        problem.add(Closeness::new(
-            "closeness",
-            reference.clone(),
-            vec![w.closeness; reference.len()],
-        ));
-    }
-    if w.fairness > 0.0 {
-        problem.add(Fairness::new(net, None, w.fairness));
-    }
-    if w.shape > 0.0 {
-        problem.add(Shape::new(net, &reference, w.shape));
-    }
-    add_border(&mut problem, options.border, &level.reference, &reference)?;
-    // Control points and the auxiliary variables of a sample both come in threes.
-    problem.variables_mut().set_runs(3);
+    level.add_net_terms(&mut problem, options, &coordinates(&level.reference), None);
     Ok(problem)
 }
 

@@ -2,12 +2,12 @@
 
 use bspline::BsplineSurface;
 use geom_core::BoundingBox;
-use glam::DVec3;
 
 use crate::field::{Sample, samples};
 use crate::grid::SampleGrid;
 use crate::locus::RelationLocus;
 use crate::target::Target;
+use crate::variables::coordinates;
 
 /// A curvature counts as constant if it varies by no more than this fraction of its size.
 const CONSTANT_RATIO: f64 = 1e-9;
@@ -15,7 +15,7 @@ const CONSTANT_RATIO: f64 = 1e-9;
 /// What is reported about a surface. Everything is measured on the surface itself at the cell
 /// midpoints of a grid with twice the samples in each direction, never on auxiliary variables.
 /// Curvatures are in units of the model.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
 pub struct Metrics {
     /// Root mean square sine of the angle between `∇_s H` and `∇_s K`, weighted by area and
     /// gradients: `√(Σ J²/Δ / Σ |∇_s H|² |∇_s K|²)` with `J = H_u K_v − H_v K_u`. 0 where `H` or
@@ -172,14 +172,4 @@ fn rescaled(mut samples: Vec<Sample>, unit: f64) -> Vec<Sample> {
         s.jet.k /= unit * unit;
     }
     samples
-}
-
-/// The unknowns of a surface: coordinates of its control points.
-pub(crate) fn coordinates(surface: &BsplineSurface) -> Vec<f64> {
-    surface.control_points().iter().flat_map(|p| p.to_array()).collect()
-}
-
-/// The control points back from the unknowns.
-pub(crate) fn control_points(x: &[f64]) -> Vec<DVec3> {
-    x.chunks_exact(3).map(DVec3::from_slice).collect()
 }

@@ -1,8 +1,9 @@
 //! Settings of an optimisation.
 
+use gp_solver::{Counts, List, ListItem, OptionValue, choices, options, serde_as_text};
 use serde::{Deserialize, Serialize};
 
-use crate::error::WeingartenError;
+use crate::error::Error;
 use crate::relation::Relation;
 
 /// Most control points or samples in one direction: enough for any design, and far below what
@@ -22,6 +23,8 @@ pub enum Formulation {
     Lifted,
 }
 
+choices!(Formulation { Reduced = "reduced", Lifted = "lifted" });
+
 /// What the border may do.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
@@ -35,35 +38,10 @@ pub enum Border {
     Fixed,
 }
 
-/// Weights of the terms; `None` is the default of the formulation.
-///
-/// | term | `reduced` | `lifted` |
-/// |---|---|---|
-/// | alignment (or the relation asked for) | 1 | 0.1 |
-/// | closeness to the reference control points | 0.1 | 0.1 |
-/// | shape preservation (edge and diagonal lengths) | 0 | 0 |
-/// | fairness (of the displacement; of the net if lifted) | 0.2 | 0.2 |
-/// | geodesic parallel isolines | 0 | not available |
-///
-/// They weigh residuals on the surface scaled to mean absolute principal curvature 5.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
-#[serde(default, deny_unknown_fields)]
-pub struct Weights {
-    /// Of the isoline alignment, or of the relation asked for in its place.
-    pub alignment: Option<f64>,
-    /// Of the closeness to the control points of the reference.
-    pub closeness: Option<f64>,
-    /// Of the preservation of edge and diagonal lengths of the control net.
-    pub shape: Option<f64>,
-    /// Of the fairness.
-    pub fairness: Option<f64>,
-    /// Of the geodesic parallelism of the curvature isolines.
-    pub parallel: Option<f64>,
-}
+choices!(Border { Free = "free", Glide = "glide", Fixed = "fixed" });
 
 /// A control point of the input to move before optimising: the moved surface is the reference.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Move {
     /// Index in u, from 0.
     pub i: usize,
@@ -73,129 +51,159 @@ pub struct Move {
     pub by: [f64; 3],
 }
 
-/// Settings of an optimisation.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(default, deny_unknown_fields)]
-pub struct WeingartenOptions {
-    /// Control nets of a multiresolution optimisation, `(n_u, n_v)` each: the surface is refitted
-    /// and optimised at each in turn (Pellis et al. 2021, Sec. 4.1.1). Empty: the input's net.
-    pub levels: Vec<(usize, usize)>,
-    /// Steps per level at most.
-    pub iterations: usize,
-    /// Samples in u and v; twice the control points if not given.
-    pub samples: Option<(usize, usize)>,
-    /// Form of the problem.
-    pub formulation: Formulation,
-    /// What the border may do.
-    pub border: Border,
-    /// What the curvatures are to obey.
-    pub relation: Relation,
-    /// Weights of the terms.
-    pub weights: Weights,
-    /// Control points to move first.
-    pub moves: Vec<Move>,
-}
+impl OptionValue for Move {
+    const FORM: &'static str = "I,J,DX,DY,DZ";
 
-impl Default for WeingartenOptions {
-    fn default() -> Self {
-        Self {
-            levels: Vec::new(),
-            iterations: 10,
-            samples: None,
-            formulation: Formulation::default(),
-            border: Border::default(),
-            relation: Relation::default(),
-            weights: Weights::default(),
-            moves: Vec::new(),
-        }
+    fn read(text: &str) -> Result<Self, String> {
+        let parts: Vec<&str> = text.split(',').map(str::trim).collect();
+        let parsed = (|| {
+            let &[i, j, x, y, z] = parts.as_slice() else { return None };
+            let by = [x.parse().ok()?, y.parse().ok()?, z.parse().ok()?];
+            Some(Self { i: i.parse().ok()?, j: j.parse().ok()?, by })
+        })();
+        parsed.ok_or_else(|| format!("`{text}` is not of the form i,j,dx,dy,dz, as in 3,4,0,0,0.1"))
+    }
+
+    fn print(&self) -> Option<String> {
+        let Self { i, j, by: [x, y, z] } = self;
+        Some(format!("{i},{j},{x},{y},{z}"))
     }
 }
 
-/// Weights with the defaults filled in.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct EffectiveWeights {
-    pub(crate) alignment: f64,
-    pub(crate) closeness: f64,
-    pub(crate) shape: f64,
-    pub(crate) fairness: f64,
-    pub(crate) parallel: f64,
+impl ListItem for Move {
+    const BETWEEN: char = ';';
+    const LIST_FORM: &'static str = "I,J,DX,DY,DZ";
 }
 
-impl WeingartenOptions {
-    pub(crate) fn effective_weights(&self) -> EffectiveWeights {
-        let alignment = match self.formulation {
+serde_as_text!(Move);
+
+options! {
+    /// Settings of an optimisation.
+    ///
+    /// Weights multiply residuals on the surface scaled to mean absolute principal curvature 5.
+    #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+    #[serde(default, deny_unknown_fields)]
+    pub struct Options {
+        /// Control nets to refit and optimise at in turn, as in 10x8,14x10,18x14,25x18; without
+        /// them the input's net.
+        ///
+        /// Pellis et al. 2021, Sec. 4.1.1.
+        levels: List<Counts> = List::default();
+        /// Steps per level.
+        iterations: usize = 10;
+        /// Samples in u and v; twice the net if not given.
+        samples: Option<Counts> = None;
+        /// Eliminated unknowns with damped steps, or the published guided projection.
+        formulation: Formulation = Formulation::Reduced;
+        /// Whether the border moves freely, glides on its own curve, or stays.
+        border: Border = Border::Free;
+        /// Curvature relation: free, linear[=a,b,c] (aH+bK+c=0), minimal, cmc[=H], developable,
+        /// gauss=K, ratio=R (k1 = R k2), curve[=H,K;H,K;...].
+        relation: Relation = Relation::Free;
+        /// Weight of the isoline alignment, or of the relation asked for; without it 1, and 0.1 in
+        /// the lifted formulation.
+        alignment: Option<f64> = None;
+        /// Weight of the closeness to the input.
+        closeness: f64 = 0.1;
+        /// Weight of the preservation of edge and diagonal lengths of the control net.
+        shape: f64 = 0.0;
+        /// Weight of the fairness of the displacement, of the net itself in the lifted formulation.
+        fairness: f64 = 0.2;
+        /// Weight of geodesic parallelism of the curvature isolines.
+        parallel: f64 = 0.0;
+        /// Move a control point first (indices from 0; repeatable).
+        moves as "move": List<Move> = List::default();
+    }
+}
+
+impl Options {
+    /// The settings of the published scheme: guided projection of the lifted formulation with the
+    /// weights of Pellis et al. 2021, Table 1.
+    #[must_use]
+    pub fn published() -> Self {
+        Self { formulation: Formulation::Lifted, ..Self::default() }
+    }
+
+    /// The weight of the alignment in force.
+    #[must_use]
+    pub fn alignment_weight(&self) -> f64 {
+        self.alignment.unwrap_or(match self.formulation {
             Formulation::Reduced => 1.0,
             Formulation::Lifted => 0.1,
-        };
-        let w = &self.weights;
-        EffectiveWeights {
-            alignment: w.alignment.unwrap_or(alignment),
-            closeness: w.closeness.unwrap_or(0.1),
-            shape: w.shape.unwrap_or(0.0),
-            fairness: w.fairness.unwrap_or(0.2),
-            parallel: w.parallel.unwrap_or(0.0),
-        }
+        })
     }
 
     /// Everything that can be checked without the surface.
-    pub(crate) fn check(&self) -> Result<(), WeingartenError> {
-        let w = self.effective_weights();
+    pub(crate) fn check(&self) -> Result<(), Error> {
         let weights = [
-            ("alignment", w.alignment),
-            ("closeness", w.closeness),
-            ("shape", w.shape),
-            ("fairness", w.fairness),
-            ("parallel", w.parallel),
+            ("alignment", self.alignment_weight()),
+            ("closeness", self.closeness),
+            ("shape", self.shape),
+            ("fairness", self.fairness),
+            ("parallel", self.parallel),
         ];
         for (name, value) in weights {
             if !(value >= 0.0 && value.is_finite()) {
-                return Err(WeingartenError::BadOption { name, value, need: "zero or more" });
+                return Err(Error::BadOption { name, value, need: "zero or more" });
             }
         }
-        for (name, value) in self.relation.numbers() {
+        for value in self.relation.numbers() {
             if !value.is_finite() {
-                return Err(WeingartenError::BadOption { name, value, need: "a finite number" });
+                let (name, need) = ("relation", "made of finite numbers");
+                return Err(Error::BadOption { name, value, need });
             }
         }
         match &self.relation {
             Relation::Linear(a, b, _) if *a == 0.0 && *b == 0.0 => {
                 let need = "different from zero, or the second coefficient must be";
-                return Err(WeingartenError::BadOption { name: "relation", value: 0.0, need });
+                return Err(Error::BadOption { name: "relation", value: 0.0, need });
             }
             Relation::Curve(points) if points.len() < 2 => {
-                return Err(WeingartenError::ShortCurve { found: points.len() });
+                return Err(Error::ShortCurve { found: points.len() });
             }
             _ => {}
         }
-        for m in &self.moves {
+        for m in self.moves.iter() {
             if let Some(&value) = m.by.iter().find(|v| !v.is_finite()) {
                 let need = "a finite displacement";
-                return Err(WeingartenError::BadOption { name: "move", value, need });
+                return Err(Error::BadOption { name: "move", value, need });
             }
         }
-        let (s_u, s_v) = self.samples.unwrap_or((2, 2));
-        for (direction, found) in [("u", s_u), ("v", s_v)] {
+        let samples = self.samples.unwrap_or(Counts { u: 2, v: 2 });
+        for (direction, found) in [("u", samples.u), ("v", samples.v)] {
             if found < 2 {
-                return Err(WeingartenError::TooFewSamples { direction, found, needed: 2 });
+                return Err(Error::TooFewSamples { direction, found, needed: 2 });
             }
         }
-        let counts = [("samples in one direction", s_u.max(s_v))]
-            .into_iter()
-            .chain(self.levels.iter().map(|l| ("control points in one direction", l.0.max(l.1))));
-        for (what, count) in counts {
+        let nets = self.levels.iter().map(|l| ("control points in one direction", l.u.max(l.v)));
+        let counts = [("samples in one direction", samples.u.max(samples.v))];
+        for (what, count) in counts.into_iter().chain(nets) {
             if count > MOST_PER_DIRECTION {
-                return Err(WeingartenError::TooMany { what, count, limit: MOST_PER_DIRECTION });
+                return Err(Error::TooMany { what, count, limit: MOST_PER_DIRECTION });
             }
         }
         if self.formulation == Formulation::Lifted {
             let reduced_only = [
                 (self.relation != Relation::Free, "a curvature relation"),
-                (w.parallel > 0.0, "the parallel weight"),
+                (self.parallel > 0.0, "the weight `parallel`"),
             ];
             if let Some(&(_, what)) = reduced_only.iter().find(|(asked, _)| *asked) {
-                return Err(WeingartenError::NeedsReduced { what });
+                return Err(Error::NeedsReduced { what });
             }
         }
         Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn moves_are_read_as_they_are_printed() {
+        let want = Move { i: 3, j: 4, by: [0.0, -1.5, 2.0] };
+        assert_eq!(Move::read("3,4,0,-1.5,2"), Ok(want));
+        assert_eq!(Move::read(&want.print().unwrap()), Ok(want));
+        assert!(Move::read("3,4,0").is_err());
     }
 }

@@ -1,25 +1,24 @@
 //! Tests that look inside: recorded first steps, Jacobians of every block.
 
-use std::sync::Arc;
-
 use bspline::{BsplineSurface, KnotVector};
 use geom_core::assert_close;
-use gp_solver::{Closeness, Factorization, ResidualBlock, System};
+use gp_solver::{Closeness, Counts, Factorization, ResidualBlock, Stage, System};
 
-use crate::blocks::{Alignment, BorderGlide, Fairness, Net, Parallel, RelationRows, Shape};
-use crate::field::samples;
+use crate::blocks::{
+    Alignment, BorderGlide, Fairness, Field, Net, Parallel, RelationRows, SampledSurface, Shape,
+};
 use crate::grid::SampleGrid;
-use crate::kernel::Field;
-use crate::level::{Level, regular_samples};
+use crate::level::Level;
 use crate::lifted;
-use crate::metrics::{Meter, coordinates};
-use crate::target::Target;
-use crate::{Relation, WeingartenOptions};
+use crate::metrics::Meter;
+use crate::variables::coordinates;
+use crate::{Options, Relation};
 
 /// The level of a recorded scene, which is on the working scale already.
-fn recorded_level(scene: &fixtures::reference::Scene) -> (Level, WeingartenOptions) {
-    let options = WeingartenOptions { samples: Some(scene.samples), ..Default::default() };
-    (Level::new(scene.surface(), &options, 1.0).unwrap(), options)
+fn recorded_level(scene: &fixtures::reference::Scene) -> (Level, Options) {
+    let (u, v) = scene.samples;
+    let options = Options { samples: Some(Counts { u, v }), ..Default::default() };
+    (Level::new(scene.surface(), options.samples, Stage::only("scene")).unwrap(), options)
 }
 
 #[test]
@@ -27,11 +26,11 @@ fn first_steps_equal_the_recorded_ones() {
     for scene in fixtures::reference::scenes() {
         let (level, options) = recorded_level(&scene);
         let x = coordinates(&level.reference);
-        let start = regular_samples(&level.grid, &x).unwrap();
-        let q0 = crate::blocks::residual_scale(&start, level.curvature);
+        let start = level.sampled(&x).unwrap();
+        let q0 = crate::blocks::residual_scale(&start.samples, level.curvature);
         assert_close(q0 / scene.first_step.q0, 1.0, 1e-10);
         for factorization in [Factorization::Auto, Factorization::Sparse] {
-            let problem = level.problem(&options, &x, &start).unwrap();
+            let problem = level.problem(&options, &start).unwrap();
             let mut system = System::new(problem, factorization).unwrap();
             system.refresh(&x);
             let energy = system.linearize(&x).unwrap();
@@ -133,10 +132,9 @@ fn small_surfaces() -> Vec<BsplineSurface> {
 #[test]
 fn jacobians_of_sample_terms_match_central_differences() {
     for surface in small_surfaces() {
-        let grid = Arc::new(SampleGrid::uniform(&surface, [9, 7]));
+        let start = SampledSurface::new(&surface, Counts { u: 9, v: 7 }).unwrap();
         let x = coordinates(&surface);
-        let start = samples(&grid, &x);
-        check_jacobian(&Alignment::new(&grid, &start, 1.0, 0.7), &x, 1e-4, 1e-8);
+        check_jacobian(&Alignment::new(&start, 0.7), &x, 1e-4, 1e-8);
         for relation in [
             Relation::Linear(1.0, 0.3, 0.2),
             Relation::ConstantGauss(0.4),
@@ -145,11 +143,11 @@ fn jacobians_of_sample_terms_match_central_differences() {
             Relation::CurveFit,
             Relation::Curve(vec![[-1.0, 0.2], [0.0, 0.5], [1.0, -0.3]]),
         ] {
-            let target = Target::new(&relation, 1.0, 1.0, &start).unwrap();
-            check_jacobian(&RelationRows::new(&grid, target, &start, 0.9), &x, 1e-4, 1e-8);
+            let block = RelationRows::new(&start, &relation, 1.0, 0.9).unwrap();
+            check_jacobian(&block, &x, 1e-4, 1e-8);
         }
         for field in [Field::Mean, Field::Gauss] {
-            let block = Parallel::new(&grid, field, &x, &start, 1.0, 0.3);
+            let block = Parallel::new(&start, field, 0.3);
             check_jacobian(&block, &x, 1e-4, 1e-7);
         }
     }
@@ -158,7 +156,7 @@ fn jacobians_of_sample_terms_match_central_differences() {
 #[test]
 fn jacobians_of_net_terms_match_central_differences() {
     for surface in small_surfaces() {
-        let net = crate::level::net(&surface);
+        let net = Net::of(&surface);
         let x = coordinates(&surface);
         let moved: Vec<f64> =
             x.iter().enumerate().map(|(k, v)| v + 0.03 * (k as f64).sin()).collect();
@@ -174,8 +172,8 @@ fn jacobians_of_net_terms_match_central_differences() {
 #[test]
 fn lifted_jacobians_match_central_differences_and_the_start_satisfies_the_definitions() {
     for surface in small_surfaces() {
-        let options = WeingartenOptions { samples: Some((6, 5)), ..Default::default() };
-        let level = Level::new(surface, &options, 1.0).unwrap();
+        let options = Options { samples: Some(Counts { u: 6, v: 5 }), ..Options::published() };
+        let level = Level::new(surface, options.samples, Stage::only("small")).unwrap();
         let x = lifted::start(&level.grid, &coordinates(&level.reference)).unwrap();
         let problem = lifted::problem(&level, &options, &x).unwrap();
         let mut system = System::new(problem, Factorization::Sparse).unwrap();

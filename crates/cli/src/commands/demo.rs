@@ -1,7 +1,7 @@
 //! `umbilic demo [DIR]`.
 
 use crate::args::ReportArgs;
-use crate::commands::weingarten::run;
+use crate::commands::weingarten::outcome;
 use crate::context::Context;
 use crate::failure::Failure;
 use crate::outcome::{Outcome, Status};
@@ -9,13 +9,14 @@ use crate::panel_files::{Quality, encode};
 use crate::report_support;
 use crate::report_support::panels::{gap_histogram, kink_histogram, panel_view, seam_table};
 use crate::report_support::weingarten::weingarten_report;
+use crate::watch::Watch;
 use bspline::BsplineSurface;
 use exchange::{LengthUnit, Model};
+use gp_solver::Counts;
 use paneling::{Clustering, Layout, Options, PanelSet, Paneling, Pattern, mold_count, panel};
 use report::Report;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
-use weingarten::WeingartenOptions;
 
 /// The built-in input.
 const ROOF: &str = include_str!("../../../../fixtures/roof.ron");
@@ -61,22 +62,26 @@ impl Demo {
         let Some(named) = model.surfaces.first() else {
             return Err(Failure::other("the built-in roof has no surface"));
         };
-        let options = WeingartenOptions { levels: LEVELS.to_vec(), ..Default::default() };
-        let run = run(&named.surface, &options, None, context).map_err(Failure::other)?;
-        let mut outcome = run.outcome(&model.unit)?;
+        let levels = LEVELS.map(|(u, v)| Counts { u, v }).to_vec().into();
+        let options = weingarten::Options { levels, ..Default::default() };
+        let mut watch = Watch::new(context, "optimising");
+        let solution =
+            weingarten::solve(&named.surface, &options, &mut watch).map_err(Failure::other)?;
+        drop(watch);
+        let mut outcome = outcome(&solution, &model.unit)?;
         if outcome.status == Status::Interrupted {
             return Ok(outcome);
         }
-        let cut = Panelings::new(&named.surface, &run.optimized.surface)?;
+        let cut = Panelings::new(&named.surface, &solution.result)?;
         cut.measure(&mut outcome)?;
         let head = "a roof of 14 x 14 control points, made a Weingarten surface at four levels:";
         outcome.summary.insert(0, head.to_owned());
         outcome.summary.extend(cut.summary());
 
         let unit = model.unit.to_string();
-        let mut report = weingarten_report(&named.surface, &run.optimized, &options, &unit)?;
+        let mut report = weingarten_report(&named.surface, &solution, &options, &unit)?;
         cut.describe(&mut report)?;
-        let result = Model::of_surface("roof", run.optimized.surface, model.unit.clone());
+        let result = Model::of_surface("roof", solution.result, model.unit.clone());
         for path in [step, glb] {
             let bytes =
                 exchange::encode_model(path, &result).map_err(|e| Failure::input(path, e))?;

@@ -4,57 +4,41 @@ use super::energies::energy_history;
 use super::jets::spline_view;
 use crate::failure::Failure;
 use bspline::BsplineSurface;
+use gp_solver::Counts;
 use report::{RelationCurve, Report};
-use weingarten::{Metrics, Optimized, Relation, RelationLocus, WeingartenOptions};
+use weingarten::{Metrics, Options, Relation, RelationLocus, Solution};
 
 /// The surface before and after with its deviation, the energies, and the options in force.
 pub(crate) fn weingarten_report(
     input: &BsplineSurface,
-    optimized: &Optimized,
-    options: &WeingartenOptions,
+    solution: &Solution,
+    options: &Options,
     length_unit: &str,
 ) -> Result<Report, Failure> {
     let mut report = super::new("Weingarten optimisation");
     report.length_unit = length_unit.to_owned();
     report.stages.push(spline_view("before", &[input], None, length_unit)?);
-    let after = spline_view("after", &[&optimized.surface], Some(&[input]), length_unit)?;
+    let after = spline_view("after", &[&solution.result], Some(&[input]), length_unit)?;
     report.stages.push(after);
-    let levels = optimized.report.levels.iter();
-    let levels = levels.map(|l| (format!("{}x{}", l.control.0, l.control.1), &l.solver));
+    let levels = solution.report.stages.iter().map(|l| (l.stage.name.clone(), &l.solver));
     report.energies = Some(energy_history(levels));
     report
         .relations
-        .extend(optimized.relation.as_ref().map(|locus| relation_curve(locus, optimized)));
+        .extend(solution.relation.as_ref().map(|locus| relation_curve(locus, solution)));
 
-    let levels = optimized.report.levels.iter();
-    let nets: Vec<String> = levels.map(|l| format!("{}x{}", l.control.0, l.control.1)).collect();
+    let nets: Vec<&str> = solution.report.stages.iter().map(|l| l.stage.name.as_str()).collect();
+    let [u, v] = solution.samples;
+    // What was asked for, with what was found in place of what was left open.
+    let in_force = Options { samples: Some(Counts { u, v }), ..options.clone() };
+    crate::option_flags::list(&mut report, &in_force, &["levels", "relation"]);
     report.option("levels", nets.join(", "));
-    report.option("iterations", options.iterations);
-    if let Some(last) = optimized.report.levels.last() {
-        report.option("samples", format!("{}x{}", last.samples.0, last.samples.1));
-    }
-    report.option("formulation", word(format!("{:?}", options.formulation)));
-    report.option("border", word(format!("{:?}", options.border)));
-    report.option("relation", relation_words(&options.relation, optimized));
-    let weights = [
-        ("alignment", options.weights.alignment),
-        ("closeness", options.weights.closeness),
-        ("shape", options.weights.shape),
-        ("fairness", options.weights.fairness),
-        ("parallel", options.weights.parallel),
-    ];
-    for (name, weight) in weights {
-        if let Some(weight) = weight {
-            report.option(&format!("weight of {name}"), weight);
-        }
-    }
-    report.option("moved control points", options.moves.len());
+    report.option("relation", relation_words(&options.relation, solution));
     Ok(report)
 }
 
 /// The relation over the curvatures of both surfaces.
-fn relation_curve(locus: &RelationLocus, optimized: &Optimized) -> RelationCurve {
-    let both = [&optimized.before, &optimized.after];
+fn relation_curve(locus: &RelationLocus, solution: &Solution) -> RelationCurve {
+    let both = [&solution.before, &solution.metrics];
     let range = |low: fn(&Metrics) -> f64, high: fn(&Metrics) -> f64| {
         let least = both.map(low).into_iter().fold(f64::INFINITY, f64::min);
         [least, both.map(high).into_iter().fold(f64::NEG_INFINITY, f64::max)]
@@ -65,8 +49,8 @@ fn relation_curve(locus: &RelationLocus, optimized: &Optimized) -> RelationCurve
 }
 
 /// What was asked for, and what it came to if that was fitted.
-fn relation_words(relation: &Relation, optimized: &Optimized) -> String {
-    let locus = optimized.relation.as_ref().map(ToString::to_string);
+fn relation_words(relation: &Relation, solution: &Solution) -> String {
+    let locus = solution.relation.as_ref().map(ToString::to_string);
     match (relation, locus) {
         (Relation::LinearFit | Relation::ConstantMeanFit, Some(found)) => {
             format!("{found}, fitted")
@@ -76,16 +60,4 @@ fn relation_words(relation: &Relation, optimized: &Optimized) -> String {
         (_, Some(given)) => given,
         (_, None) => "any".to_owned(),
     }
-}
-
-/// A variant's name as words: `ConstantMeanFit` becomes `constant mean fit`.
-fn word(debug: String) -> String {
-    let mut words = String::new();
-    for c in debug.chars() {
-        if c.is_uppercase() && words.ends_with(char::is_alphabetic) {
-            words.push(' ');
-        }
-        words.extend(c.to_lowercase());
-    }
-    words
 }

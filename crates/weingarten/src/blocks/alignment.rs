@@ -10,6 +10,7 @@ use crate::field::{Sample, determinants_into};
 use crate::grid::SampleGrid;
 use crate::kernel::{THIRD, alignment, curvature_jet};
 use crate::real::{Lanes, Triple};
+use crate::sampled::SampledSurface;
 use crate::sweep::{LaneKernel, Scratch, load, store};
 
 /// Least value of the residual scale `q₀` as a fraction of `κ⁵`, `κ` the mean absolute principal
@@ -22,7 +23,8 @@ pub(crate) const SCALE_FLOOR: f64 = 1e-8;
 /// `J / √Δ` does not depend on the parametrisation, and `q₀`, the root mean square of
 /// `|∇_s H| |∇_s K|` over the samples at the start, takes its unit away: the residual is of the
 /// size of the sine of the angle between the isolines. `Δ` is that of the last iterate.
-pub(crate) struct Alignment {
+#[derive(Clone, Debug)]
+pub struct Alignment {
     grid: Arc<SampleGrid>,
     elements: Elements,
     weight: f64,
@@ -32,16 +34,12 @@ pub(crate) struct Alignment {
 }
 
 impl Alignment {
-    /// `start` are the samples of `grid` on the starting surface; `curvature` is its mean
-    /// absolute principal curvature.
-    pub(crate) fn new(
-        grid: &Arc<SampleGrid>,
-        start: &[Sample],
-        curvature: f64,
-        weight: f64,
-    ) -> Self {
-        let q0 = residual_scale(start, curvature);
-        let factors = padded(grid, start.iter().map(|s| weight / (s.delta().sqrt() * q0)));
+    /// Rows for every sample, scaled where the surface starts.
+    #[must_use]
+    pub fn new(start: &SampledSurface, weight: f64) -> Self {
+        let grid = &start.grid;
+        let q0 = residual_scale(&start.samples, start.curvature);
+        let factors = padded(grid, start.samples.iter().map(|s| weight / (s.delta().sqrt() * q0)));
         Self { grid: Arc::clone(grid), elements: grid.elements(), weight, q0, factors }
     }
 }

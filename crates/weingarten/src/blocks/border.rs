@@ -33,7 +33,8 @@ pub(crate) fn border_points(net: Net) -> Vec<Vec<usize>> {
 /// `w (I − t tᵀ)(c − p)` for every border control point `c` with foot point `p` on the curve and
 /// tangent `t` there, both of the last iterate; corners are held, `w (c − c⁰)`
 /// (Pellis et al. 2021, Sec. 3.1.4).
-pub(crate) struct BorderGlide {
+#[derive(Clone, Debug)]
+pub struct BorderGlide {
     elements: Elements,
     curves: Vec<BsplineCurve>,
     gliding: Vec<Gliding>,
@@ -41,6 +42,7 @@ pub(crate) struct BorderGlide {
 }
 
 /// A border point with the plane across its curve.
+#[derive(Clone, Debug)]
 struct Gliding {
     control: usize,
     /// The curve it glides on; corners have none.
@@ -51,7 +53,8 @@ struct Gliding {
 
 impl BorderGlide {
     /// Glides on the curves through the border points of `reference`.
-    pub(crate) fn new(net: Net, reference: &[f64], weight: f64) -> Self {
+    #[must_use]
+    pub fn new(net: Net, reference: &[f64], weight: f64) -> Self {
         let at = |k: usize| DVec3::from_slice(&reference[3 * k..3 * k + 3]);
         let (mut curves, mut gliding) = (Vec::new(), Vec::new());
         let mut elements = Elements::new();

@@ -1,4 +1,8 @@
-//! The terms of the energy as residual blocks of the solver.
+//! The terms of the energy as residual blocks of the solver, for problems of one's own too.
+//!
+//! Unknowns are the coordinates of the control points, `3 (i n_v + j) + axis`, in units in which
+//! the surface has mean absolute principal curvature 5 (a level's [`gp_solver::Stage`] tells its
+//! unit). Every block multiplies its residuals by a weight.
 
 mod alignment;
 mod border;
@@ -7,10 +11,14 @@ mod parallel;
 mod relation;
 mod rows;
 
-pub(crate) use alignment::Alignment;
+pub use crate::kernel::Field;
+pub use crate::sampled::SampledSurface;
+pub use alignment::Alignment;
 #[cfg(test)]
 pub(crate) use alignment::residual_scale;
-pub(crate) use border::{BorderGlide, border_points};
-pub(crate) use net::{Fairness, Net, Shape};
-pub(crate) use parallel::Parallel;
-pub(crate) use relation::RelationRows;
+pub use border::BorderGlide;
+pub(crate) use border::border_points;
+pub use gp_solver::Closeness;
+pub use net::{Fairness, Net, Shape};
+pub use parallel::Parallel;
+pub use relation::RelationRows;

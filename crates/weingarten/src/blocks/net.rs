@@ -1,17 +1,33 @@
 //! Terms on the control net: fairness and shape preservation.
 
+use bspline::BsplineSurface;
 use gp_solver::{Elements, ResidualBlock};
 
 /// Size of a control net and whether its ends are joined.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Net {
-    pub(crate) n_u: usize,
-    pub(crate) n_v: usize,
-    pub(crate) closed_u: bool,
-    pub(crate) closed_v: bool,
+pub struct Net {
+    /// Control points in u.
+    pub n_u: usize,
+    /// Control points in v.
+    pub n_v: usize,
+    /// Whether the last row in u is followed by the first.
+    pub closed_u: bool,
+    /// The same in v.
+    pub closed_v: bool,
 }
 
 impl Net {
+    /// The net of a surface.
+    #[must_use]
+    pub fn of(surface: &BsplineSurface) -> Self {
+        Self {
+            n_u: surface.n_u(),
+            n_v: surface.n_v(),
+            closed_u: surface.knots_u().is_periodic(),
+            closed_v: surface.knots_v().is_periodic(),
+        }
+    }
+
     fn index(self, i: usize, j: usize) -> usize {
         (i % self.n_u) * self.n_v + j % self.n_v
     }
@@ -63,7 +79,8 @@ impl Net {
 /// reference net (Pellis et al. 2021, Eq. 11, there with `c` instead of `d`).
 ///
 /// On the displacement, because fairness of the net itself slowly flattens the surface.
-pub(crate) struct Fairness {
+#[derive(Clone, Debug)]
+pub struct Fairness {
     elements: Elements,
     triples: Vec<[usize; 3]>,
     /// Second differences of the reference, weighted; empty if the net itself is to be fair.
@@ -73,7 +90,8 @@ pub(crate) struct Fairness {
 
 impl Fairness {
     /// Fairness of the displacement from `reference`, or of the net itself without one.
-    pub(crate) fn new(net: Net, reference: Option<&[f64]>, weight: f64) -> Self {
+    #[must_use]
+    pub fn new(net: Net, reference: Option<&[f64]>, weight: f64) -> Self {
         let triples = net.second_differences();
         let mut elements = Elements::new();
         for t in &triples {
@@ -123,11 +141,24 @@ impl ResidualBlock for Fairness {
     fn is_linear(&self) -> bool {
         true
     }
+
+    fn set_reference(&mut self, reference: &[f64]) -> bool {
+        let reads = self.triples.iter().flatten().max().map_or(0, |k| 3 * (k + 1));
+        let fits = !self.reference.is_empty() && reference.len() >= reads;
+        if fits {
+            self.reference.fill(0.0);
+            let mut values = vec![0.0; self.reference.len()];
+            self.residuals(reference, &mut values);
+            self.reference = values;
+        }
+        fits
+    }
 }
 
 /// `w (l − l⁰)` for the lengths of all edges and face diagonals of the control net
 /// (Pellis et al. 2021, Sec. 3.1.4).
-pub(crate) struct Shape {
+#[derive(Clone, Debug)]
+pub struct Shape {
     elements: Elements,
     edges: Vec<[usize; 2]>,
     lengths: Vec<f64>,
@@ -135,7 +166,9 @@ pub(crate) struct Shape {
 }
 
 impl Shape {
-    pub(crate) fn new(net: Net, reference: &[f64], weight: f64) -> Self {
+    /// Keeps the lengths that `reference`, the coordinates of the control points, has.
+    #[must_use]
+    pub fn new(net: Net, reference: &[f64], weight: f64) -> Self {
         // An edge without length has no direction to keep.
         let mut edges = net.edges();
         edges.retain(|&e| length(reference, e).0 > 0.0);
@@ -169,6 +202,15 @@ impl ResidualBlock for Shape {
         for ((r, &edge), l0) in residuals.iter_mut().zip(&self.edges).zip(&self.lengths) {
             *r = self.weight * (length(x, edge).0 - l0);
         }
+    }
+
+    fn set_reference(&mut self, reference: &[f64]) -> bool {
+        let reads = self.edges.iter().flatten().max().map_or(0, |k| 3 * (k + 1));
+        if reference.len() < reads {
+            return false;
+        }
+        self.lengths = self.edges.iter().map(|&e| length(reference, e).0).collect();
+        true
     }
 
     fn linearize(&self, x: &[f64], residuals: &mut [f64], jacobian: &mut [f64]) {

@@ -7,10 +7,11 @@ use pulp::Simd;
 
 use super::alignment::{SCALE_FLOOR, padded, store_gradient};
 use super::rows::{RowValues, SampleTerm, fill};
-use crate::field::{Sample, parallel_gradients};
+use crate::field::parallel_gradients;
 use crate::grid::SampleGrid;
 use crate::kernel::{FOURTH, Field, parallel, parallel_jet};
 use crate::real::{Lanes, Triple};
+use crate::sampled::SampledSurface;
 use crate::sweep::{LaneKernel, Scratch, load, store};
 
 /// One row per sample, `w (ψ_u f_v − ψ_v f_u) / (√Δ p₀)` with `ψ = |∇_s f|²` and `f` one of the
@@ -18,7 +19,8 @@ use crate::sweep::{LaneKernel, Scratch, load, store};
 ///
 /// `p₀` is the root mean square of `|∇_s ψ| |∇_s f|` at the start: without it the rows of `K` are
 /// five orders of magnitude larger than those of the alignment and bring the iteration to a halt.
-pub(crate) struct Parallel {
+#[derive(Clone, Debug)]
+pub struct Parallel {
     field: Field,
     grid: Arc<SampleGrid>,
     elements: Elements,
@@ -26,16 +28,11 @@ pub(crate) struct Parallel {
 }
 
 impl Parallel {
-    /// As [`super::Alignment::new`]; `x` are the control points `start` was sampled from.
-    pub(crate) fn new(
-        grid: &Arc<SampleGrid>,
-        field: Field,
-        x: &[f64],
-        start: &[Sample],
-        curvature: f64,
-        w: f64,
-    ) -> Self {
-        let gradients = parallel_gradients(grid, field, x, start);
+    /// As [`super::Alignment::new`], for the isolines of one of the curvatures.
+    #[must_use]
+    pub fn new(start: &SampledSurface, field: Field, weight: f64) -> Self {
+        let SampledSurface { grid, x, samples, curvature } = start;
+        let gradients = parallel_gradients(grid, field, x, samples);
         let square = gradients.iter().map(|g| g * g).sum::<f64>() / gradients.len() as f64;
         // ψ is |∇f|²: f, its gradient and ψ's gradient make 1/length^7 for H and 1/length^10 for K.
         let degree = match field {
@@ -43,7 +40,7 @@ impl Parallel {
             Field::Gauss => 10,
         };
         let scale = square.sqrt().max(SCALE_FLOOR * curvature.powi(degree));
-        let factors = padded(grid, start.iter().map(|s| w / (s.delta().sqrt() * scale)));
+        let factors = padded(grid, samples.iter().map(|s| weight / (s.delta().sqrt() * scale)));
         Self { field, grid: Arc::clone(grid), elements: grid.elements(), factors }
     }
 }

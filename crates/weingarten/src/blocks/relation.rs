@@ -11,12 +11,17 @@ use crate::field::{Sample, samples};
 use crate::grid::SampleGrid;
 use crate::kernel::{SECOND, curvature, second};
 use crate::real::{Lanes, Real, Triple};
+use crate::relation::Relation;
+use crate::sampled::SampledSurface;
 use crate::sweep::{LaneKernel, Scratch, load, store};
 use crate::target::Target;
 
-/// One row per sample, `w (α H + β K + γ)`, with coefficients that a [`Target`] updates from the
-/// last iterate, or the ratio of the principal curvatures.
-pub(crate) struct RelationRows {
+/// One row per sample, `w (α H + β K + γ)`, with coefficients that follow from the [`Relation`] and,
+/// where it is fitted, from the last iterate; or `w (κ₁ − R κ₂)` for a ratio of the principal
+/// curvatures (Pellis et al. 2021, Sec. 3.2). Coefficients are scaled to the size of the curvatures
+/// at the start, so that a residual of 1 is a miss as large as they are.
+#[derive(Clone, Debug)]
+pub struct RelationRows {
     grid: Arc<SampleGrid>,
     elements: Elements,
     target: Target,
@@ -26,16 +31,25 @@ pub(crate) struct RelationRows {
 }
 
 impl RelationRows {
-    pub(crate) fn new(
-        grid: &Arc<SampleGrid>,
-        target: Target,
-        start: &[Sample],
+    /// Rows for every sample; `None` for [`Relation::Free`] and curves of fewer than two points.
+    /// The unknowns have `unit` lengths per length of the model, which the relation speaks of.
+    #[must_use]
+    pub fn new(
+        start: &SampledSurface,
+        relation: &Relation,
+        unit: f64,
         weight: f64,
-    ) -> Self {
+    ) -> Option<Self> {
+        let target = Target::new(relation, unit, start.curvature, &start.samples)?;
+        Some(Self::of_target(start, target, weight))
+    }
+
+    pub(crate) fn of_target(start: &SampledSurface, target: Target, weight: f64) -> Self {
+        let grid = &start.grid;
         let coefficients = vec![0.0; 3 * grid.u.len() * grid.stride()];
         let elements = grid.elements();
         let mut made = Self { grid: Arc::clone(grid), elements, target, coefficients, weight };
-        made.set_coefficients(start);
+        made.set_coefficients(&start.samples);
         made
     }
 

@@ -1,0 +1,130 @@
+//! Flags made from the options of a method: names, forms, helps and defaults come from its table.
+
+use std::fmt;
+use std::path::Path;
+
+use clap::builder::ValueParser;
+use clap::{Arg, ArgAction, ArgMatches};
+use gp_solver::{Field, Fields};
+use serde::de::DeserializeOwned;
+
+use crate::args::ConfigArgs;
+use crate::failure::Failure;
+use report::Report;
+
+/// The flags of the options `O` that were given, with their texts.
+#[derive(Clone)]
+pub(crate) struct OptionFlags<O: Fields> {
+    given: Vec<(&'static Field<O>, String)>,
+}
+
+impl<O: Fields> fmt::Debug for OptionFlags<O> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_map().entries(self.given.iter().map(|(field, text)| (field.name, text))).finish()
+    }
+}
+
+impl<O: Fields> OptionFlags<O> {
+    /// The options in force: defaults, below the configuration file, below the flags.
+    pub(crate) fn options(&self, config: &ConfigArgs) -> Result<O, Failure>
+    where
+        O: DeserializeOwned,
+    {
+        let mut options: O = config.load()?;
+        for field in self.given.iter().flat_map(|(field, _)| field.replaces) {
+            // A rule on the command line replaces whatever rule the file has.
+            if let Some(other) = O::field(field) {
+                (other.reset)(&mut options);
+            }
+        }
+        for (field, text) in &self.given {
+            (field.set)(&mut options, text)
+                .map_err(|e| Failure::usage(format!("{}: {e}", flag(field.name))))?;
+        }
+        Ok(options)
+    }
+}
+
+/// Lists options as they are in force, but for those named, which the caller tells of itself.
+pub(crate) fn list<O: Fields>(report: &mut Report, options: &O, but: &[&str]) {
+    for field in O::FIELDS.iter().filter(|field| !but.contains(&field.name)) {
+        if let Some(value) = (field.get)(options) {
+            report.option(&field.name.replace('_', " "), value);
+        }
+    }
+}
+
+/// What a library says of fields in backticks, said of flags.
+pub(crate) fn in_flags<O: Fields>(message: &str) -> String {
+    O::FIELDS.iter().fold(message.to_owned(), |text, field| {
+        text.replace(&format!("`{}`", field.name), &flag(field.name))
+    })
+}
+
+/// A value with the file it names put in its place: the control points of `relation curve=FILE`.
+fn from_file(name: &str, text: &str) -> Result<String, String> {
+    let Some(path) = text.strip_prefix("curve=").filter(|_| name == "relation").map(Path::new)
+    else {
+        return Ok(text.to_owned());
+    };
+    if path.extension().is_none_or(|e| e != "ron") {
+        return Ok(text.to_owned());
+    }
+    let points: Vec<(f64, f64)> =
+        exchange::read_ron(path).map_err(|e| format!("{}: {e}", path.display()))?;
+    let points: Vec<String> = points.iter().map(|(h, k)| format!("{h},{k}")).collect();
+    Ok(format!("curve={}", points.join(";")))
+}
+
+fn flag(name: &str) -> String {
+    format!("--{}", name.replace('_', "-"))
+}
+
+fn arg<O: Fields>(field: &'static Field<O>, defaults: &O) -> Arg {
+    let mut help = field.help();
+    if let Some(default) = (field.get)(defaults).filter(|_| !field.is_switch) {
+        help.push_str(&format!(" [default: {default}]"));
+    }
+    let check = move |text: &str| -> Result<String, String> {
+        let text = from_file(field.name, text)?;
+        (field.set)(&mut O::default(), &text).map(|()| text)
+    };
+    let arg = Arg::new(field.name)
+        .long(field.name.replace('_', "-"))
+        .help(help)
+        .value_parser(ValueParser::new(check));
+    if field.is_switch {
+        return arg.num_args(0).default_missing_value("true");
+    }
+    let action = if field.separator.is_some() { ArgAction::Append } else { ArgAction::Set };
+    arg.value_name(field.form).action(action).allow_hyphen_values(true)
+}
+
+impl<O: Fields> clap::Args for OptionFlags<O> {
+    fn augment_args(command: clap::Command) -> clap::Command {
+        let defaults = O::default();
+        O::FIELDS.iter().fold(command, |command, field| command.arg(arg(field, &defaults)))
+    }
+
+    fn augment_args_for_update(command: clap::Command) -> clap::Command {
+        Self::augment_args(command)
+    }
+}
+
+impl<O: Fields> clap::FromArgMatches for OptionFlags<O> {
+    fn from_arg_matches(matches: &ArgMatches) -> Result<Self, clap::Error> {
+        let text = |field: &Field<O>| {
+            let words: Vec<&str> =
+                matches.get_many::<String>(field.name)?.map(String::as_str).collect();
+            let between = field.separator.map(String::from).unwrap_or_default();
+            Some(words.join(&between))
+        };
+        let given = O::FIELDS.iter().filter_map(|field| Some((field, text(field)?)));
+        Ok(Self { given: given.collect() })
+    }
+
+    fn update_from_arg_matches(&mut self, matches: &ArgMatches) -> Result<(), clap::Error> {
+        *self = Self::from_arg_matches(matches)?;
+        Ok(())
+    }
+}

@@ -1,0 +1,136 @@
+//! What is solved one after the other: the input refitted to each net, on one working scale.
+
+use bspline::{BsplineSurface, Degree, KnotError, KnotVector};
+use geom_core::BoundingBox;
+use glam::DVec3;
+use gp_solver::{Counts, Stage};
+
+use crate::error::Error;
+use crate::field::Sample;
+use crate::grid::SampleGrid;
+use crate::level::Level;
+use crate::options::{Move, Options};
+use crate::sampled::regular_samples;
+use crate::variables::{coordinates, scaled};
+
+/// Mean absolute principal curvature on the working scale (Pellis et al. 2021, Table 1).
+const WORKING_CURVATURE: f64 = 5.0;
+/// A surface whose mean absolute principal curvature times its bounding-box diagonal is below
+/// this is flat: its working scale is bounding-box diagonal = 1.
+const FLAT_RATIO: f64 = 1e-9;
+/// Least degree a level is refitted with: the derivatives of the curvatures are those of the
+/// third derivatives of the surface.
+const LEAST_DEGREE: usize = 3;
+
+/// The levels of a run, coarse to fine.
+pub(crate) struct Schedule {
+    /// The reference of every level, in units of the model.
+    nets: Vec<BsplineSurface>,
+    /// Working lengths per length of the model.
+    unit: f64,
+    samples: Option<Counts>,
+}
+
+impl Schedule {
+    pub(crate) fn new(surface: &BsplineSurface, options: &Options) -> Result<Self, Error> {
+        options.check()?;
+        let input = moved(surface, &options.moves)?;
+        let nets = nets(&input, &options.levels)?;
+        let unit = working_unit(&nets[0], options.samples)?;
+        Ok(Self { nets, unit, samples: options.samples })
+    }
+
+    /// Number of levels.
+    pub(crate) fn len(&self) -> usize {
+        self.nets.len()
+    }
+
+    /// A level on the working scale.
+    pub(crate) fn level(&self, number: usize) -> Result<Level, Error> {
+        let reference = scaled(&self.nets[number], self.unit)?;
+        let name = Counts { u: reference.n_u(), v: reference.n_v() }.to_string();
+        let stage = Stage::new(name, number, self.len()).at([0.0; 3], self.unit);
+        Level::new(reference, self.samples, stage)
+    }
+}
+
+/// Samples in u and v: as asked for, or twice the control points.
+pub(crate) fn sample_counts(surface: &BsplineSurface, samples: Option<Counts>) -> [usize; 2] {
+    samples.map_or([2 * surface.n_u(), 2 * surface.n_v()], |s| [s.u, s.v])
+}
+
+/// Mean absolute principal curvature of samples of a surface, `None` where nothing is curved.
+pub(crate) fn curvature_size(
+    surface: &BsplineSurface,
+    samples: &[Sample],
+) -> Result<Option<f64>, Error> {
+    let mean = |s: &Sample| {
+        let (k1, k2) = s.principal();
+        0.5 * (k1.abs() + k2.abs())
+    };
+    let curvature = samples.iter().map(mean).sum::<f64>() / samples.len() as f64;
+    Ok((curvature * extent(surface)? > FLAT_RATIO).then_some(curvature))
+}
+
+/// The input with its control points moved as asked for.
+fn moved(surface: &BsplineSurface, moves: &[Move]) -> Result<BsplineSurface, Error> {
+    let (n_u, n_v) = (surface.n_u(), surface.n_v());
+    let mut points = surface.control_points().to_vec();
+    for &Move { i, j, by } in moves {
+        if i >= n_u || j >= n_v {
+            return Err(Error::NoSuchControlPoint { i, j, n_u, n_v });
+        }
+        points[i * n_v + j] += DVec3::from_array(by);
+    }
+    Ok(surface.with_control_points(points)?)
+}
+
+/// The reference at every level: the input refitted to each net, or the input itself.
+fn nets(input: &BsplineSurface, levels: &[Counts]) -> Result<Vec<BsplineSurface>, Error> {
+    if levels.is_empty() {
+        return Ok(vec![input.clone()]);
+    }
+    let level = |counts: &Counts| {
+        let knots = |like: &KnotVector, n: usize| {
+            uniform_like(like, n)
+                .map_err(|source| Error::LevelKnots { level: counts.to_string(), source })
+        };
+        let (u, v) = (knots(input.knots_u(), counts.u)?, knots(input.knots_v(), counts.v)?);
+        if !input.is_rational() && u == *input.knots_u() && v == *input.knots_v() {
+            return Ok(input.clone());
+        }
+        input.refit(&u, &v).map_err(|source| Error::Level { level: counts.to_string(), source })
+    };
+    levels.iter().map(level).collect()
+}
+
+/// Uniform knots of `n` control points with degree, domain and closedness of `like`.
+fn uniform_like(like: &KnotVector, n: usize) -> Result<KnotVector, KnotError> {
+    let degree = Degree::new(like.degree().get().max(LEAST_DEGREE))?;
+    let (start, end) = like.domain();
+    let at = |t: f64| {
+        if t >= 1.0 { end } else { start + (end - start) * t }
+    };
+    if like.is_periodic() {
+        let period: Vec<f64> = (0..=n).map(|i| at(i as f64 / n as f64)).collect();
+        return KnotVector::periodic(degree, &period);
+    }
+    let unit = KnotVector::clamped_uniform(degree, n)?;
+    KnotVector::new(degree, unit.knots().iter().map(|&t| at(t)).collect())
+}
+
+/// Working lengths per length of the model.
+fn working_unit(surface: &BsplineSurface, samples: Option<Counts>) -> Result<f64, Error> {
+    let extent = extent(surface)?;
+    let grid = SampleGrid::uniform(surface, sample_counts(surface, samples));
+    let samples = regular_samples(&grid, &coordinates(surface))?;
+    let curvature = curvature_size(surface, &samples)?;
+    Ok(curvature.map_or(1.0 / extent, |curvature| curvature / WORKING_CURVATURE))
+}
+
+/// Diagonal of the bounding box of the control points.
+fn extent(surface: &BsplineSurface) -> Result<f64, Error> {
+    let diagonal = BoundingBox::of(surface.control_points().iter().copied())
+        .map_or(0.0, BoundingBox::diagonal);
+    if diagonal > 0.0 { Ok(diagonal) } else { Err(Error::NoExtent) }
+}
