@@ -15,6 +15,7 @@ use gp_solver::{
     Closeness, Elements, Observer, Options, Problem, Progress, QuadraticBuilder,
     QuadraticConstraints, Report, ResidualBlock, solve_observed,
 };
+use numerics::{Lanes, Triple};
 use rayon::prelude::*;
 
 use crate::blocks::{Fairness, Shape};
@@ -24,7 +25,6 @@ use crate::kernel::SECOND;
 use crate::level::{LAST_ITERATE_WEIGHT, Level, add_border, net, regular_samples};
 use crate::metrics::coordinates;
 use crate::options::WeingartenOptions;
-use crate::real::{Lanes, Triple};
 use crate::sweep::{LaneKernel, Scratch, store};
 
 /// Auxiliary variables of a sample.

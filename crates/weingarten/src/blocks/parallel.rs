@@ -3,6 +3,7 @@
 use std::sync::Arc;
 
 use gp_solver::{Elements, ResidualBlock};
+use numerics::{Lanes, Triple};
 use pulp::Simd;
 
 use super::alignment::{SCALE_FLOOR, padded, store_gradient};
@@ -10,7 +11,6 @@ use super::rows::{RowValues, SampleTerm, fill};
 use crate::field::{Sample, parallel_gradients};
 use crate::grid::SampleGrid;
 use crate::kernel::{FOURTH, Field, parallel, parallel_jet};
-use crate::real::{Lanes, Triple};
 use crate::sweep::{LaneKernel, Scratch, load, store};
 
 /// One row per sample, `w (ψ_u f_v − ψ_v f_u) / (√Δ p₀)` with `ψ = |∇_s f|²` and `f` one of the
