@@ -28,7 +28,7 @@ pub use glam::{DMat3, DVec2, DVec3};
 pub use isolines::{Isoline, isolines};
 pub use jet::SurfaceJet;
 pub use mesh_curvature::{VertexCurvature, mesh_curvature_statistics, vertex_curvatures};
-pub use numerics::{self as linalg, assert_close, least_squares};
+pub use numerics::assert_close;
 pub use poly_mesh::{FaceId, HalfEdgeId, MeshError, PolyMesh, VertexId};
 pub use quad_grid::{GridError, QuadGrid};
 pub use third_order::{ThirdOrder, UmbilicKind};

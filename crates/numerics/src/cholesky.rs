@@ -195,8 +195,12 @@ pub fn minimize_quadratic(hessian: &Matrix, gradient: &[f64]) -> Vec<f64> {
     vec![0.0; negative.len()]
 }
 
+/// A pivot that elimination leaves at this share of its entry is rounding.
+pub const PIVOT_RATIO: f64 = 1e-14;
+
 /// Cholesky factor in the lower triangle of the rows of `a`, in place. A pivot that elimination
-/// leaves at `rel_tol` of its entry or less becomes infinite, which makes its unknown zero: rows
+/// leaves at `rel_tol` of its entry
+/// ([`PIVOT_RATIO`] or more) or less becomes infinite, which makes its unknown zero: rows
 /// that follow from others, or are empty, are skipped.
 ///
 /// # Panics
@@ -204,10 +208,10 @@ pub fn minimize_quadratic(hessian: &Matrix, gradient: &[f64]) -> Vec<f64> {
 ///
 /// # Example
 /// ```
-/// use numerics::{factor_semidefinite, solve_semidefinite};
+/// use numerics::{PIVOT_RATIO, factor_semidefinite, solve_semidefinite};
 /// let mut a = [[4.0, 0.0, 0.0], [1.0, 3.0, 0.0], [0.0, 0.0, 0.0]];
 /// let mut b = [6.0, 7.0, 0.0];
-/// factor_semidefinite(&mut a, 1e-14);
+/// factor_semidefinite(&mut a, PIVOT_RATIO);
 /// solve_semidefinite(&a, &mut b);
 /// assert!((b[0] - 1.0).abs() < 1e-15 && (b[1] - 2.0).abs() < 1e-15 && b[2] == 0.0);
 /// ```

@@ -48,7 +48,7 @@ mod vector;
 
 pub use affine::{AffineSpace, affine_space};
 pub use cholesky::{
-    Cholesky, NotPositiveDefinite, add_normal_row, cholesky, factor_semidefinite,
+    Cholesky, NotPositiveDefinite, PIVOT_RATIO, add_normal_row, cholesky, factor_semidefinite,
     minimize_quadratic, solve_semidefinite,
 };
 pub use close::assert_close;
