@@ -4,8 +4,8 @@ use crate::curve::BsplineCurve;
 use crate::error::SplineError;
 use crate::knots::KnotVector;
 use crate::surface::BsplineSurface;
-use geom_core::{RankError, least_squares};
 use glam::DVec3;
+use numerics::{RankError, least_squares};
 
 /// Parameters per control point and direction at which a refit samples the given surface.
 const REFIT_SAMPLES: usize = 4;

@@ -1,6 +1,6 @@
 //! The energy of one surface sample and its derivative by the nine parameter derivatives.
 
-use crate::lanes::{Lanes, Vec3, axpy, cross, dot, scaled};
+use numerics::{Lanes, Real, Triple};
 use pulp::Simd;
 
 /// Umbilic guard: `r²`, the squared half-difference of the principal curvatures, is replaced by
@@ -81,7 +81,7 @@ impl Density {
 
 /// The nine derivatives `S_u, S_v, S_uu, S_uv, S_vv, S_uuu, S_uuv, S_uvv, S_vvv` of some samples,
 /// or the adjoints of all of them.
-pub(crate) type Derivatives<S> = [Vec3<S>; 9];
+pub(crate) type Derivatives<S> = [Triple<Lanes<S>>; 9];
 
 /// Everything the densities and their adjoints share.
 pub(crate) struct Shape<S: Simd> {
@@ -92,9 +92,9 @@ pub(crate) struct Shape<S: Simd> {
     ga: Lanes<S>,
     /// `al², al be, al ga, be², 2 be ga, ga²`.
     products: [Lanes<S>; 6],
-    pub(crate) n: Vec3<S>,
-    e1: Vec3<S>,
-    e2: Vec3<S>,
+    pub(crate) n: Triple<Lanes<S>>,
+    e1: Triple<Lanes<S>>,
+    e2: Triple<Lanes<S>>,
     /// `D³S · n` in the frame.
     third: [Lanes<S>; 4],
     /// `D²S · e1` and `D²S · e2` in the frame.
@@ -139,22 +139,22 @@ fn pair<S: Simd>(a: &[Lanes<S>; 3], b: &[Lanes<S>; 3], sum: Lanes<S>) -> Lanes<S
 impl<S: Simd> Shape<S> {
     #[inline(always)]
     pub(crate) fn new(d: &Derivatives<S>) -> Self {
-        let normal = cross(&d[0], &d[1]);
+        let normal = d[0].cross_fused(d[1]);
         // Divided by the squares, which does not have to wait for the roots.
-        let (e, f) = (dot(&d[0], &d[0]), dot(&d[0], &d[1]));
-        let square = dot(&normal, &normal);
+        let (e, f) = (d[0].dot(d[0]), d[0].dot(d[1]));
+        let square = normal.dot(normal);
         let (area, length) = (square.sqrt(), e.sqrt());
         let (inv_area, al) = (area * square.recip(), length * e.recip());
         let ga = length * inv_area;
         let be = -(f * al * inv_area);
         let products = [al * al, al * be, al * ga, be * be, be * ga * 2.0, ga * ga];
-        let n = scaled(&normal, inv_area);
-        let e1 = scaled(&d[0], al);
-        let e2 = axpy(&d[0], be, &scaled(&d[1], ga));
-        let h = [dot(&d[5], &n), dot(&d[6], &n), dot(&d[7], &n), dot(&d[8], &n)];
-        let p = [dot(&d[2], &n), dot(&d[3], &n), dot(&d[4], &n)];
-        let x = [dot(&d[2], &e1), dot(&d[3], &e1), dot(&d[4], &e1)];
-        let y = [dot(&d[2], &e2), dot(&d[3], &e2), dot(&d[4], &e2)];
+        let n = normal.scale(inv_area);
+        let e1 = d[0].scale(al);
+        let e2 = d[1].scale(ga).plus(be, d[0]);
+        let h = [d[5].dot(n), d[6].dot(n), d[7].dot(n), d[8].dot(n)];
+        let p = [d[2].dot(n), d[3].dot(n), d[4].dot(n)];
+        let x = [d[2].dot(e1), d[3].dot(e1), d[4].dot(e1)];
+        let y = [d[2].dot(e2), d[3].dot(e2), d[4].dot(e2)];
         let second = to_frame(&products, &p);
         let xf = to_frame(&products, &x);
         let yf = to_frame(&products, &y);
@@ -223,9 +223,9 @@ impl<S: Simd> Shape<S> {
             gg.fma(along_u, bg * along_v),
             gg * along_v,
         ];
-        let mut nb = scaled(&d[5], hb[0]);
+        let mut nb = d[5].scale(hb[0]);
         for k in 1..4 {
-            nb = axpy(&d[5 + k], hb[k], &nb);
+            nb = nb.plus(hb[k], d[5 + k]);
         }
         // Of the forms in the frame; those of the tangential parts with the opposite sign.
         let xb = [a3.fma(l, b * m), b2.fma(l, c2 * m), c.fma(l, w3 * m)];
@@ -249,30 +249,30 @@ impl<S: Simd> Shape<S> {
         let stretch = self.area * g.area;
         let (w11, w22, w12) = (m11 + stretch, m22 + stretch, m21);
         let w21 = m21 + (pair(&yb, x, -(xb[0] * y[0])) - xb[1].fma(y[1], xb[2] * y[2]));
-        let o1 = -pair(&xb, &self.second, pair(&ob, x, dot(&nb, &self.e1)));
-        let o2 = -pair(&yb, &self.second, pair(&ob, y, dot(&nb, &self.e2)));
+        let o1 = -pair(&xb, &self.second, pair(&ob, x, nb.dot(self.e1)));
+        let o2 = -pair(&yb, &self.second, pair(&ob, y, nb.dot(self.e2)));
         let pb = from_frame(&self.products, &ob);
         let xb = from_frame(&self.products, &xb);
         let yb = from_frame(&self.products, &yb);
-        let (n, e1, e2) = (&self.n, &self.e1, &self.e2);
+        let (n, e1, e2) = (self.n, self.e1, self.e2);
         let mut out = *d;
         for k in 0..3 {
             let (p, x, y) = (pb[k], -xb[k], -yb[k]);
-            out[2 + k] = axpy(n, p, &axpy(e1, x, &scaled(e2, y)));
+            out[2 + k] = e2.scale(y).plus(x, e1).plus(p, n);
         }
         for k in 0..4 {
-            out[5 + k] = scaled(n, hb[k]);
+            out[5 + k] = n.scale(hb[k]);
         }
         let (u1, u2, un) = (al.fma(w11, be * w12), al.fma(w21, be * w22), al.fma(o1, be * o2));
-        out[0] = axpy(e1, u1, &axpy(e2, u2, &scaled(n, un)));
-        out[1] = axpy(e1, ga * w12, &axpy(e2, ga * w22, &scaled(n, ga * o2)));
+        out[0] = n.scale(un).plus(u2, e2).plus(u1, e1);
+        out[1] = n.scale(ga * o2).plus(ga * w22, e2).plus(ga * w12, e1);
         out
     }
 
     /// The density times the area element and `weight`, and the adjoints of that product.
     #[inline(always)]
     pub(crate) fn density(&self, w: &Density, weight: Lanes<S>) -> (Lanes<S>, FrameAdjoint<S>) {
-        let simd = self.area.0;
+        let simd = self.area.simd;
         let j = self.area * weight;
         let [l, m, q] = self.second;
         let [f1c, f1s, f3c, f3s] = self.harmonics;
@@ -347,10 +347,10 @@ impl<S: Simd> Shape<S> {
 
     /// Adjoints by `S_u` and `S_v` of the area element times `weight`.
     #[inline(always)]
-    pub(crate) fn area_adjoint(&self, weight: Lanes<S>) -> [Vec3<S>; 2] {
+    pub(crate) fn area_adjoint(&self, weight: Lanes<S>) -> [Triple<Lanes<S>>; 2] {
         // The element grows with the part of δS_u and δS_v that lies in the tangent plane.
         let j = self.area * weight;
-        let along = scaled(&self.e2, j * self.be);
-        [axpy(&self.e1, j * self.al, &along), scaled(&self.e2, j * self.ga)]
+        let along = self.e2.scale(j * self.be);
+        [along.plus(j * self.al, self.e1), self.e2.scale(j * self.ga)]
     }
 }

@@ -7,6 +7,7 @@ use crate::freedom::Freedom;
 use crate::functional::{Energy, ROOT_EPSILON};
 use crate::metric::MetricAssembly;
 use gp_solver::{LbfgsOptions, Metric, Progress, SolverError, Stage, Status, lbfgs};
+use numerics::{dot, factor_semidefinite, solve_semidefinite};
 use std::ops::ControlFlow;
 
 /// How a level is minimised.
@@ -72,7 +73,7 @@ struct Projected<'a> {
     rows: &'a [Vec<f64>],
     // M⁻¹ Cᵀ, and the Cholesky factor of C M⁻¹ Cᵀ.
     images: Vec<Vec<f64>>,
-    schur: Vec<f64>,
+    schur: Vec<Vec<f64>>,
 }
 
 impl<'a> Projected<'a> {
@@ -88,52 +89,22 @@ impl<'a> Projected<'a> {
             })
             .collect();
         let n = rows.len();
-        let mut schur = vec![0.0; n * n];
+        let mut schur = vec![vec![0.0; n]; n];
         for i in 0..n {
             for j in 0..=i {
-                schur[i * n + j] = dot(&rows[i], &images[j]);
+                schur[i][j] = dot(&rows[i], &images[j]);
             }
         }
         // Conditions that follow from others leave a pivot of rounding errors; they are skipped.
-        for j in 0..n {
-            let scale = schur[j * n + j];
-            for k in 0..j {
-                schur[j * n + j] -= schur[j * n + k] * schur[j * n + k];
-            }
-            let pivot = schur[j * n + j];
-            let root = if pivot > 1e-12 * scale { pivot.sqrt() } else { f64::INFINITY };
-            schur[j * n + j] = root;
-            for i in j + 1..n {
-                for k in 0..j {
-                    schur[i * n + j] -= schur[i * n + k] * schur[j * n + k];
-                }
-                schur[i * n + j] /= root;
-            }
-        }
+        factor_semidefinite(&mut schur, 1e-12);
         Self { metric, rows, images, schur }
-    }
-
-    fn solve_schur(&self, rhs: &mut [f64]) {
-        let n = rhs.len();
-        for i in 0..n {
-            for k in 0..i {
-                rhs[i] -= self.schur[i * n + k] * rhs[k];
-            }
-            rhs[i] /= self.schur[i * n + i];
-        }
-        for i in (0..n).rev() {
-            for k in i + 1..n {
-                rhs[i] -= self.schur[k * n + i] * rhs[k];
-            }
-            rhs[i] /= self.schur[i * n + i];
-        }
     }
 
     /// Moves `y` to the conditions by the shortest way in the metric.
     fn restore(&self, targets: &[f64], y: &mut [f64]) {
         let mut gap: Vec<f64> =
             self.rows.iter().zip(targets).map(|(row, t)| t - dot(row, y)).collect();
-        self.solve_schur(&mut gap);
+        solve_semidefinite(&self.schur, &mut gap);
         for (image, g) in self.images.iter().zip(&gap) {
             y.iter_mut().zip(image).for_each(|(y, i)| *y += g * i);
         }
@@ -146,7 +117,7 @@ impl Metric for Projected<'_> {
             metric.solve_in_place(gradient);
         }
         let mut multipliers: Vec<f64> = self.rows.iter().map(|row| dot(row, gradient)).collect();
-        self.solve_schur(&mut multipliers);
+        solve_semidefinite(&self.schur, &mut multipliers);
         for (image, m) in self.images.iter().zip(&multipliers) {
             gradient.iter_mut().zip(image).for_each(|(g, i)| *g -= m * i);
         }
@@ -460,8 +431,4 @@ impl Level<'_> {
         total.status = Status::IterationLimit;
         Ok(())
     }
-}
-
-fn dot(a: &[f64], b: &[f64]) -> f64 {
-    a.iter().zip(b).map(|(x, y)| x * y).sum()
 }

@@ -2,8 +2,8 @@
 
 use crate::density::{Density, FrameAdjoint, Shape};
 use crate::kernel::{gather, table_adjoint, table_derivatives};
-use crate::lanes::{Lanes, align_frame};
 use crate::rules::{MAX_LANES, Table};
+use numerics::{Lanes, Real, align_frame};
 use pulp::{Simd, WithSimd};
 
 /// `ℓ²` of the Sobolev norm as a share of the area.
@@ -58,11 +58,11 @@ impl WithSimd for ElementMatrix<'_> {
             let place = table.chunk(chunk, S::F64_LANES);
             let d = table_derivatives(simd, values, place, &points, 3);
             let shape = Shape::new(&d);
-            let weight = Lanes(simd, weights[chunk]);
+            let weight = Lanes::new(simd, weights[chunk]);
             if self.mixture.sobolev > 0.0 {
                 let (mut area, mut w) = ([0.0; MAX_LANES], [0.0; MAX_LANES]);
-                simd.partial_store_f64s(&mut area[..S::F64_LANES], shape.area.1);
-                simd.partial_store_f64s(&mut w[..S::F64_LANES], weight.1);
+                simd.partial_store_f64s(&mut area[..S::F64_LANES], shape.area.value);
+                simd.partial_store_f64s(&mut w[..S::F64_LANES], weight.value);
                 for lane in 0..S::F64_LANES {
                     let j = area[lane].max(self.least_area);
                     mass += w[lane] * j;
@@ -85,9 +85,10 @@ impl WithSimd for ElementMatrix<'_> {
                     let row = shape.pull_back(&d, adjoint);
                     for k in 0..count {
                         let sum = table_adjoint(simd, values, place, (k, count), &row);
+                        let sum = sum.to_array();
                         for c in 0..3 {
                             let mut lanes = [0.0; MAX_LANES];
-                            simd.partial_store_f64s(&mut lanes[..S::F64_LANES], sum[c].1);
+                            simd.partial_store_f64s(&mut lanes[..S::F64_LANES], sum[c].value);
                             for (lane, &value) in lanes[..S::F64_LANES].iter().enumerate() {
                                 residuals[(at * S::F64_LANES + lane) * width + 3 * k + c] = value;
                             }

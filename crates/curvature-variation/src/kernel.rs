@@ -1,8 +1,8 @@
 //! Energy, area and their gradients of one patch, a vector of samples or of patches at a time.
 
 use crate::density::{Density, Derivatives, Shape};
-use crate::lanes::{Aligned, Lanes, Vec3, align_frame, axpy, cross, dot, scaled};
 use crate::rules::{SeparableRule, Table};
+use numerics::{Aligned, Lanes, Real, Triple, align_frame};
 use pulp::{Simd, WithSimd, bytemuck};
 
 /// What a pass computes.
@@ -43,8 +43,8 @@ pub(crate) fn gather(positions: &[f64], controls: &[u32], points: &mut [[f64; 3]
 }
 
 #[inline(always)]
-fn zero<S: Simd>(simd: S) -> Vec3<S> {
-    [Lanes::splat(simd, 0.0); 3]
+fn zero<S: Simd>(simd: S) -> Triple<Lanes<S>> {
+    Triple::splat(Lanes::splat(simd, 0.0))
 }
 
 /// What one vector of samples adds.
@@ -52,7 +52,7 @@ struct Sampled<S: Simd> {
     area: Lanes<S>,
     integral: Lanes<S>,
     adjoint: Derivatives<S>,
-    area_adjoint: [Vec3<S>; 2],
+    area_adjoint: [Triple<Lanes<S>>; 2],
 }
 
 #[inline(always)]
@@ -70,9 +70,9 @@ fn sample<S: Simd>(d: &Derivatives<S>, weight: Lanes<S>, task: Task<'_>) -> Samp
     }
     let integral = match task {
         Task::Energy(density) => shape.density(density, weight).0,
-        _ => Lanes::splat(weight.0, 0.0),
+        _ => Lanes::splat(weight.simd, 0.0),
     };
-    let nothing = zero(weight.0);
+    let nothing = zero(weight.simd);
     Sampled { area, integral, adjoint: [nothing; 9], area_adjoint: [nothing; 2] }
 }
 
@@ -97,14 +97,14 @@ pub(crate) fn table_derivatives<S: Simd>(
         let length = count * step;
         let rows = &values[begin..begin + 3 * length - (step - 1)];
         for (k, point) in points.iter().enumerate() {
-            let p = [
-                Lanes::splat(simd, point[0]),
-                Lanes::splat(simd, point[1]),
-                Lanes::splat(simd, point[2]),
-            ];
+            let p = Triple {
+                x: Lanes::splat(simd, point[0]),
+                y: Lanes::splat(simd, point[1]),
+                z: Lanes::splat(simd, point[2]),
+            };
             for (order, sum) in sums.iter_mut().enumerate() {
-                let t = Lanes(simd, rows[order * length + k * step]);
-                *sum = [t.fma(p[0], sum[0]), t.fma(p[1], sum[1]), t.fma(p[2], sum[2])];
+                let t = Lanes::new(simd, rows[order * length + k * step]);
+                *sum = sum.plus(t, p);
             }
         }
         d[3 * group..3 * group + 3].copy_from_slice(&sums);
@@ -120,11 +120,11 @@ pub(crate) fn table_adjoint<S: Simd>(
     (start, step): (usize, usize),
     (k, count): (usize, usize),
     adjoint: &Derivatives<S>,
-) -> Vec3<S> {
+) -> Triple<Lanes<S>> {
     let mut sum = zero(simd);
     for (order, a) in adjoint.iter().enumerate() {
-        let t = Lanes(simd, values[start + (order * count + k) * step]);
-        sum = [t.fma(a[0], sum[0]), t.fma(a[1], sum[1]), t.fma(a[2], sum[2])];
+        let t = Lanes::new(simd, values[start + (order * count + k) * step]);
+        sum = sum.plus(t, *a);
     }
     sum
 }
@@ -153,7 +153,7 @@ impl WithSimd for PatchRun<'_, Table> {
             for (chunk, &w) in weights.iter().enumerate() {
                 let place = rule.chunk(chunk, S::F64_LANES);
                 let d = table_derivatives(simd, values, place, &points, groups);
-                let s = sample(&d, Lanes(simd, w), self.task);
+                let s = sample(&d, Lanes::new(simd, w), self.task);
                 area = area + s.area;
                 integral = integral + s.integral;
                 if with_gradient {
@@ -161,14 +161,10 @@ impl WithSimd for PatchRun<'_, Table> {
                     let [au, av] = s.area_adjoint;
                     for (k, sum) in sums.iter_mut().enumerate() {
                         let g = table_adjoint(simd, values, place, (k, count), &s.adjoint);
-                        let tu = Lanes(simd, values[start + k * step]);
-                        let tv = Lanes(simd, values[start + (count + k) * step]);
-                        let [mut now, mut now_area] = sum.0;
-                        for c in 0..3 {
-                            now[c] = now[c] + g[c];
-                            now_area[c] = tu.fma(au[c], tv.fma(av[c], now_area[c]));
-                        }
-                        sum.0 = [now, now_area];
+                        let tu = Lanes::new(simd, values[start + k * step]);
+                        let tv = Lanes::new(simd, values[start + (count + k) * step]);
+                        let [now, now_area] = sum.0;
+                        sum.0 = [now + g, now_area.plus(tv, av).plus(tu, au)];
                     }
                 }
             }
@@ -177,9 +173,10 @@ impl WithSimd for PatchRun<'_, Table> {
                 let places = &self.places[patch * count..(patch + 1) * count];
                 for (&place, sum) in places.iter().zip(&sums) {
                     let g = &mut self.gradients[GRADIENT_LEN * place as usize..][..GRADIENT_LEN];
+                    let [integral, area] = [sum.0[0].to_array(), sum.0[1].to_array()];
                     for c in 0..3 {
-                        g[c] += sum.0[0][c].sum();
-                        g[3 + c] += sum.0[1][c].sum();
+                        g[c] += integral[c].sum();
+                        g[3 + c] += area[c].sum();
                     }
                 }
             }
@@ -192,17 +189,17 @@ type Basis<S> = [[Lanes<S>; 4]; 4];
 
 /// `Σ t_k v_k`.
 #[inline(always)]
-fn along<S: Simd>(t: &[Lanes<S>; 4], v: &[Vec3<S>; 4]) -> Vec3<S> {
-    let mut sum = scaled(&v[0], t[0]);
+fn along<S: Simd>(t: &[Lanes<S>; 4], v: &[Triple<Lanes<S>>; 4]) -> Triple<Lanes<S>> {
+    let mut sum = v[0].scale(t[0]);
     for k in 1..4 {
-        sum = axpy(&v[k], t[k], &sum);
+        sum = sum.plus(t[k], v[k]);
     }
     sum
 }
 
 /// The nine derivatives at a node from the derivatives along v (`rows[order][i]`).
 #[inline(always)]
-fn derivatives_along_u<S: Simd>(t: &Basis<S>, rows: &[[Vec3<S>; 4]; 4]) -> Derivatives<S> {
+fn derivatives_along_u<S: Simd>(t: &Basis<S>, rows: &[[Triple<Lanes<S>>; 4]; 4]) -> Derivatives<S> {
     [
         along(&t[1], &rows[0]),
         along(&t[0], &rows[1]),
@@ -220,7 +217,7 @@ fn derivatives_along_u<S: Simd>(t: &Basis<S>, rows: &[[Vec3<S>; 4]; 4]) -> Deriv
 #[derive(Clone, Copy)]
 struct NodeAdjoint<S: Simd> {
     integral: Derivatives<S>,
-    area: [Vec3<S>; 2],
+    area: [Triple<Lanes<S>>; 2],
 }
 
 /// Adjoints of the derivatives along v, `[order][i]`: four orders of the integral, two of the area.
@@ -229,29 +226,29 @@ fn back_along_u<S: Simd>(
     simd: S,
     basis: &[Aligned<Basis<S>>],
     nodes: &[Aligned<NodeAdjoint<S>>],
-    back: &mut [[Vec3<S>; 4]; 6],
+    back: &mut [[Triple<Lanes<S>>; 4]; 6],
 ) {
     for i in 0..4 {
         // In two rounds, whose sums fit into registers.
         let mut sums = [zero(simd); 2];
         for (Aligned(t), Aligned(node)) in basis.iter().zip(nodes) {
             let a = &node.integral;
-            sums[0] = axpy(&a[0], t[1][i], &sums[0]);
-            sums[1] = axpy(&node.area[0], t[1][i], &sums[1]);
-            sums[0] = axpy(&a[2], t[2][i], &sums[0]);
-            sums[0] = axpy(&a[5], t[3][i], &sums[0]);
+            sums[0] = sums[0].plus(t[1][i], a[0]);
+            sums[1] = sums[1].plus(t[1][i], node.area[0]);
+            sums[0] = sums[0].plus(t[2][i], a[2]);
+            sums[0] = sums[0].plus(t[3][i], a[5]);
         }
         [back[0][i], back[4][i]] = sums;
         let mut sums = [zero(simd); 4];
         for (Aligned(t), Aligned(node)) in basis.iter().zip(nodes) {
             let a = &node.integral;
-            sums[0] = axpy(&a[1], t[0][i], &sums[0]);
-            sums[1] = axpy(&a[4], t[0][i], &sums[1]);
-            sums[2] = axpy(&a[8], t[0][i], &sums[2]);
-            sums[3] = axpy(&node.area[1], t[0][i], &sums[3]);
-            sums[0] = axpy(&a[3], t[1][i], &sums[0]);
-            sums[1] = axpy(&a[7], t[1][i], &sums[1]);
-            sums[0] = axpy(&a[6], t[2][i], &sums[0]);
+            sums[0] = sums[0].plus(t[0][i], a[1]);
+            sums[1] = sums[1].plus(t[0][i], a[4]);
+            sums[2] = sums[2].plus(t[0][i], a[8]);
+            sums[3] = sums[3].plus(t[0][i], node.area[1]);
+            sums[0] = sums[0].plus(t[1][i], a[3]);
+            sums[1] = sums[1].plus(t[1][i], a[7]);
+            sums[0] = sums[0].plus(t[2][i], a[6]);
         }
         [back[1][i], back[2][i], back[3][i], back[5][i]] = sums;
     }
@@ -271,7 +268,7 @@ impl WithSimd for PatchRun<'_, SeparableRule> {
         let nothing = zero(simd);
         let mut basis = Vec::with_capacity(rule.nodes);
         for values in &rule.basis {
-            let mut t = [[nothing[0]; 4]; 4];
+            let mut t = [[nothing.x; 4]; 4];
             for order in 0..4 {
                 for k in 0..4 {
                     t[order][k] = Lanes::splat(simd, values[order][k]);
@@ -282,11 +279,11 @@ impl WithSimd for PatchRun<'_, SeparableRule> {
         self.gradients.fill(0.0);
         // Overwritten again and again, and so outside the loops, which would clear them each time.
         let mut adjoints = Vec::with_capacity(rule.nodes);
-        let mut coordinates = Aligned([nothing[0].1; 48]);
+        let mut coordinates = Aligned([nothing.x.value; 48]);
         let mut points = Aligned([[nothing; 4]; 4]);
         let mut rows = Aligned([[nothing; 4]; 4]);
         let mut back = Aligned([[nothing; 4]; 6]);
-        let mut sums = Aligned([nothing[0].1; 16 * GRADIENT_LEN]);
+        let mut sums = Aligned([nothing.x.value; 16 * GRADIENT_LEN]);
         let patches = self.integrals.len();
         for first in (0..patches).step_by(lanes) {
             // Lanes without a patch repeat the last one.
@@ -303,9 +300,13 @@ impl WithSimd for PatchRun<'_, SeparableRule> {
                 }
             }
             for (k, p) in coordinates.0.as_chunks::<3>().0.iter().enumerate() {
-                points.0[k / 4][k % 4] = [Lanes(simd, p[0]), Lanes(simd, p[1]), Lanes(simd, p[2])];
+                points.0[k / 4][k % 4] = Triple {
+                    x: Lanes::new(simd, p[0]),
+                    y: Lanes::new(simd, p[1]),
+                    z: Lanes::new(simd, p[2]),
+                };
             }
-            let (mut area, mut integral) = (nothing[0], nothing[0]);
+            let (mut area, mut integral) = (nothing.x, nothing.x);
             for (v, Aligned(tv)) in basis.iter().enumerate() {
                 // Along v for every row of control points, then along u for every node.
                 let orders = if self.task == Task::Area { 2 } else { 4 };
@@ -319,8 +320,8 @@ impl WithSimd for PatchRun<'_, SeparableRule> {
                 for (Aligned(t), &weight) in basis.iter().zip(weights) {
                     let weight = Lanes::splat(simd, weight);
                     if self.task == Task::Area {
-                        let normal = cross(&along(&t[1], &rows.0[0]), &along(&t[0], &rows.0[1]));
-                        area = dot(&normal, &normal).sqrt().fma(weight, area);
+                        let normal = along(&t[1], &rows.0[0]).cross_fused(along(&t[0], &rows.0[1]));
+                        area = normal.dot(normal).sqrt().fma(weight, area);
                         continue;
                     }
                     let s = sample(&derivatives_along_u(t, &rows.0), weight, self.task);
@@ -339,22 +340,29 @@ impl WithSimd for PatchRun<'_, SeparableRule> {
                         let t = [tv[0][j], tv[1][j], tv[2][j], tv[3][j]];
                         for i in 0..4 {
                             let sums = &mut sums.0[GRADIENT_LEN * (4 * i + j)..][..GRADIENT_LEN];
+                            let [mut integral, mut area] = [nothing; 2];
+                            if v > 0 {
+                                integral.x.value = sums[0];
+                                integral.y.value = sums[1];
+                                integral.z.value = sums[2];
+                                area.x.value = sums[3];
+                                area.y.value = sums[4];
+                                area.z.value = sums[5];
+                            }
+                            for order in 0..4 {
+                                integral = integral.plus(t[order], back.0[order][i]);
+                            }
+                            area = area.plus(t[1], back.0[5][i]).plus(t[0], back.0[4][i]);
+                            let [integral, area] = [integral.to_array(), area.to_array()];
                             for c in 0..3 {
-                                let before = if v > 0 { sums[c] } else { nothing[0].1 };
-                                let mut sum = t[0].fma(back.0[0][i][c], Lanes(simd, before));
-                                for order in 1..4 {
-                                    sum = t[order].fma(back.0[order][i][c], sum);
-                                }
-                                sums[c] = sum.1;
-                                let before = if v > 0 { sums[3 + c] } else { nothing[0].1 };
-                                let sum = t[1].fma(back.0[5][i][c], Lanes(simd, before));
-                                sums[3 + c] = t[0].fma(back.0[4][i][c], sum).1;
+                                sums[c] = integral[c].value;
+                                sums[3 + c] = area[c].value;
                             }
                         }
                     }
                 }
             }
-            let (area, integral) = ([area.1], [integral.1]);
+            let (area, integral) = ([area.value], [integral.value]);
             let (areas, values): (&[f64], &[f64]) =
                 (bytemuck::cast_slice(&area), bytemuck::cast_slice(&integral));
             let flat: &[f64] = bytemuck::cast_slice(&sums.0);

@@ -38,7 +38,6 @@ mod guides;
 #[cfg(test)]
 mod independent;
 mod kernel;
-mod lanes;
 mod metric;
 mod rules;
 mod samples;

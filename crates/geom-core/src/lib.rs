@@ -4,14 +4,11 @@
 //! its outward normal has negative mean curvature.
 
 mod bounding_box;
-mod close;
 mod curvature_derivatives;
 mod curvature_statistics;
 mod forms;
 mod isolines;
 mod jet;
-mod least_squares;
-pub mod linalg;
 mod mesh_curvature;
 mod poly_mesh;
 mod quad_grid;
@@ -20,7 +17,6 @@ mod torus_fit;
 mod tri_mesh;
 
 pub use bounding_box::BoundingBox;
-pub use close::assert_close;
 pub use curvature_derivatives::CurvatureDerivatives;
 pub use curvature_statistics::{CurvatureStatistics, ValueRange};
 pub use forms::{
@@ -31,8 +27,8 @@ pub use forms::{
 pub use glam::{DMat3, DVec2, DVec3};
 pub use isolines::{Isoline, isolines};
 pub use jet::SurfaceJet;
-pub use least_squares::{RANK_RATIO, RankError, least_squares};
 pub use mesh_curvature::{VertexCurvature, mesh_curvature_statistics, vertex_curvatures};
+pub use numerics::assert_close;
 pub use poly_mesh::{FaceId, HalfEdgeId, MeshError, PolyMesh, VertexId};
 pub use quad_grid::{GridError, QuadGrid};
 pub use third_order::{ThirdOrder, UmbilicKind};

@@ -2,9 +2,9 @@
 
 use crate::curvature_statistics::CurvatureStatistics;
 use crate::forms::{FirstForm, SecondForm, gaussian_curvature, mean_curvature};
-use crate::least_squares::least_squares;
 use crate::poly_mesh::{PolyMesh, VertexId};
 use glam::DVec3;
+use numerics::least_squares;
 use rayon::prelude::*;
 
 /// Unknowns of a quadratic and of a cubic piece through the vertex itself.

@@ -1,7 +1,7 @@
 //! The torus nearest to a set of points.
 
-use crate::least_squares::least_squares;
 use glam::{DMat3, DVec3};
+use numerics::least_squares;
 
 /// Unknowns: centre, two tilts of the axis, two radii.
 const UNKNOWNS: usize = 7;

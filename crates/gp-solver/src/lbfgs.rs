@@ -8,6 +8,7 @@ use crate::line_search::{LineSearch, Outcome};
 use crate::observer::{Observer, Progress};
 use crate::report::{IterationRecord, Report, Status, Timings};
 use crate::schedule::Stage;
+use numerics::{axpy, dot};
 
 /// A smooth function of many unknowns.
 pub trait Objective {
@@ -241,8 +242,8 @@ fn two_loop(
     let mut alpha = vec![0.0; memory.len()];
     for (pair, a) in memory.iter().zip(&mut alpha).rev() {
         *a = pair.rho * dot(&pair.s, rest);
-        add_scaled(rest, -*a, &pair.y);
-        add_scaled(direction, -*a, &pair.image);
+        axpy(-*a, &pair.y, rest);
+        axpy(-*a, &pair.image, direction);
     }
     if let Some(last) = memory.back() {
         let gamma = 1.0 / (last.rho * dot(&last.y, &last.image));
@@ -252,7 +253,7 @@ fn two_loop(
     }
     for (pair, a) in memory.iter().zip(&alpha) {
         let b = pair.rho * dot(&pair.y, direction);
-        add_scaled(direction, a - b, &pair.s);
+        axpy(a - b, &pair.s, direction);
     }
     direction.iter_mut().for_each(|d| *d = -*d);
 }
@@ -267,16 +268,6 @@ fn check_start(energy: f64, gradient: &[f64]) -> Result<(), SolverError> {
     match gradient.iter().position(|g| !g.is_finite()) {
         Some(row) => fault(row, Quantity::Gradient, gradient[row]),
         None => Ok(()),
-    }
-}
-
-pub(crate) fn dot(a: &[f64], b: &[f64]) -> f64 {
-    a.iter().zip(b).map(|(x, y)| x * y).sum()
-}
-
-fn add_scaled(to: &mut [f64], factor: f64, from: &[f64]) {
-    for (t, f) in to.iter_mut().zip(from) {
-        *t += factor * f;
     }
 }
 

@@ -62,7 +62,7 @@ mod trust_region;
 mod variables;
 
 pub use block::{EnergyBlock, ResidualBlock};
-pub use blocks::{Closeness, NumericBlock};
+pub use blocks::{Closeness, DualBlock, ElementFunction, NumericBlock};
 pub use check::{DerivativeCheck, check_gradient, check_jacobian};
 pub use checkpoint::{Checkpoint, Fingerprint};
 pub use damping::DampingRule;

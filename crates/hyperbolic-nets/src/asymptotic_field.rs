@@ -1,9 +1,10 @@
 //! Curvature of a triangle mesh, and the directions in which it vanishes.
 
 use geom_core::{
-    DMat3, DVec2, DVec3, FirstForm, SecondForm, TriMesh, asymptotic_directions, least_squares,
+    DMat3, DVec2, DVec3, FirstForm, SecondForm, TriMesh, asymptotic_directions,
     principal_curvatures,
 };
+use numerics::least_squares;
 use rayon::prelude::*;
 
 /// Second fundamental forms at the vertices of a triangle mesh, from cubic fits.

@@ -1,8 +1,8 @@
 //! Free-form deformation by a cage: a box whose corners are moved determines the transformation.
 
 use crate::darboux::{DarbouxError, DarbouxMap};
-use crate::small::right_singular_vectors;
 use geom_core::{BoundingBox, DVec3};
+use numerics::right_singular_vectors;
 
 /// How much freedom the transformation has.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]

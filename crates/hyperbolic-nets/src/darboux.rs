@@ -2,6 +2,8 @@
 
 use crate::{BilinearPatch, Quadric};
 use geom_core::{DMat3, DVec3};
+use glam::DMat4;
+use numerics::{dot, norm};
 
 /// Why a point or a net cannot be transformed.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -134,7 +136,7 @@ impl DarbouxMap {
                 std::array::from_fn(|_| kept.next().unwrap_or(0.0))
             });
             let sign = if skip % 2 == 0 { 1.0 } else { -1.0 };
-            sign * crate::small::determinant4(minor)
+            sign * DMat4::from_cols_array_2d(&minor).determinant()
         });
         let length = norm(&kernel);
         if !(length > 1e-14) {
@@ -147,8 +149,11 @@ impl DarbouxMap {
                 gram[i][j] = (0..5).map(|k| n[i][k] * n[j][k]).sum();
             }
         }
-        let inverse =
-            crate::small::inverse4(gram).ok_or_else(|| bad("it maps space to a plane"))?;
+        let inverse = DMat4::from_cols_array_2d(&gram).inverse();
+        if !inverse.is_finite() {
+            return Err(bad("it maps space to a plane"));
+        }
+        let inverse = inverse.to_cols_array_2d();
         let pseudo_inverse = std::array::from_fn(|k| {
             std::array::from_fn(|j| (0..4).map(|i| n[i][k] * inverse[i][j]).sum())
         });
@@ -428,14 +433,6 @@ fn project(lifted: &[f64; 5]) -> Option<DVec3> {
 /// The bilinear form of `|y|² − m s`.
 fn form(a: &[f64; 5], b: &[f64; 5]) -> f64 {
     a[0] * b[0] + a[1] * b[1] + a[2] * b[2] - 0.5 * (a[3] * b[4] + a[4] * b[3])
-}
-
-fn dot(a: &[f64; 5], b: &[f64; 5]) -> f64 {
-    a.iter().zip(b).map(|(x, y)| x * y).sum()
-}
-
-fn norm(a: &[f64; 5]) -> f64 {
-    dot(a, a).sqrt()
 }
 
 fn parallel(a: &[f64; 5], b: &[f64; 5]) -> bool {

@@ -2,6 +2,7 @@
 
 use crate::{BilinearPatch, NetError, PatchError, QuadNet};
 use geom_core::{ClosestPoint, DVec3};
+use numerics::smallest_eigenvector;
 use rayon::prelude::*;
 
 /// Points at which tangent planes are compared along every inner edge.
@@ -149,38 +150,8 @@ fn distance_from_best_plane(points: &[DVec3]) -> f64 {
             }
         }
     }
-    let normal = smallest_eigenvector(covariance);
+    let normal = DVec3::from_array(smallest_eigenvector(covariance));
     points.iter().map(|p| (*p - centre).dot(normal).abs()).fold(0.0, f64::max)
-}
-
-/// Unit eigenvector of the smallest eigenvalue of a symmetric matrix, by Jacobi rotations.
-pub(crate) fn smallest_eigenvector(mut a: [[f64; 3]; 3]) -> DVec3 {
-    let mut vectors = [DVec3::X, DVec3::Y, DVec3::Z];
-    for _ in 0..30 {
-        let off = a[0][1].abs() + a[0][2].abs() + a[1][2].abs();
-        if off <= 1e-300 {
-            break;
-        }
-        for (p, q) in [(0, 1), (0, 2), (1, 2)] {
-            if a[p][q] == 0.0 {
-                continue;
-            }
-            let theta = (a[q][q] - a[p][p]) / (2.0 * a[p][q]);
-            let t = theta.signum() / (theta.abs() + (theta * theta + 1.0).sqrt());
-            let c = 1.0 / (t * t + 1.0).sqrt();
-            let s = t * c;
-            for k in 0..3 {
-                (a[k][p], a[k][q]) = (c * a[k][p] - s * a[k][q], s * a[k][p] + c * a[k][q]);
-            }
-            for k in 0..3 {
-                (a[p][k], a[q][k]) = (c * a[p][k] - s * a[q][k], s * a[p][k] + c * a[q][k]);
-            }
-            (vectors[p], vectors[q]) =
-                (vectors[p] * c - vectors[q] * s, vectors[p] * s + vectors[q] * c);
-        }
-    }
-    let smallest = (0..3).min_by(|&i, &j| a[i][i].total_cmp(&a[j][j])).unwrap_or(0);
-    vectors[smallest]
 }
 
 /// Distances of all vertices from the tangent plane of a surface at their feet, in model units.

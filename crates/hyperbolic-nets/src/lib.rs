@@ -45,7 +45,6 @@ mod published;
 mod quad_distance;
 mod sample;
 mod shape;
-mod small;
 mod transformed;
 
 pub use asymptotic_field::AsymptoticField;

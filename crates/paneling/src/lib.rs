@@ -26,7 +26,6 @@ mod output;
 mod paneling;
 mod seam;
 mod search;
-mod small;
 
 pub use error::PanelingError;
 pub use fit::clustering::DiagramAxis;

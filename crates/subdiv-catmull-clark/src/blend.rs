@@ -1,6 +1,7 @@
 //! Weights that fade an extraordinary vertex's own surface into the subdivision surface.
 
 use crate::jet::{Jet, separable_jet};
+use numerics::Series;
 
 /// How the surface is repaired around extraordinary vertices, where Catmull-Clark surfaces have
 /// unbounded or discontinuous curvature.
@@ -53,68 +54,21 @@ pub fn flat_step(t: f64) -> [f64; 4] {
     if s > 1.0 - 5e-3 {
         return [0.0; 4];
     }
-    let one = Taylor::constant(1.0);
-    let x = Taylor([s, 2.0, 0.0, 0.0]);
-    let rest = one.minus(&x);
-    let a = x.reciprocal().scale(-1.0).exp().times(&rest.reciprocal()).scale(-2.0);
-    let b = rest.reciprocal().scale(-1.0).exp().times(&x.reciprocal()).scale(-2.0);
-    let d = b.minus(&a);
+    let one = Series::constant(1.0);
+    let x = Series([s, 2.0, 0.0, 0.0]);
+    let rest = one - x;
+    let a = (-x.recip()).exp() * rest.recip() * -2.0;
+    let b = (-rest.recip()).exp() * x.recip() * -2.0;
+    let d = b - a;
     // 1/(1 + e^d) = 1 − 1/(1 + e^(−d)): take the exponential that cannot overflow.
-    let value = if d.0[0] > 0.0 {
-        one.minus(&one.plus(&d.scale(-1.0).exp()).reciprocal())
-    } else {
-        one.plus(&d.exp()).reciprocal()
-    };
+    let value =
+        if d.0[0] > 0.0 { one - (one + (-d).exp()).recip() } else { (one + d.exp()).recip() };
     [value.0[0], value.0[1], 2.0 * value.0[2], 6.0 * value.0[3]]
 }
 
 /// Jet of the product weight `step(u) step(v)`.
 pub(crate) fn weight_jet(step: impl Fn(f64) -> [f64; 4], u: f64, v: f64) -> Jet {
     separable_jet(&step(u), &step(v))
-}
-
-/// A Taylor polynomial of degree three (coefficients, not derivatives).
-#[derive(Clone, Copy)]
-struct Taylor([f64; 4]);
-
-impl Taylor {
-    fn constant(c: f64) -> Self {
-        Self([c, 0.0, 0.0, 0.0])
-    }
-
-    fn plus(&self, other: &Self) -> Self {
-        Self(std::array::from_fn(|i| self.0[i] + other.0[i]))
-    }
-
-    fn minus(&self, other: &Self) -> Self {
-        Self(std::array::from_fn(|i| self.0[i] - other.0[i]))
-    }
-
-    fn scale(&self, factor: f64) -> Self {
-        Self(self.0.map(|c| factor * c))
-    }
-
-    fn times(&self, other: &Self) -> Self {
-        Self(std::array::from_fn(|i| (0..=i).map(|j| self.0[j] * other.0[i - j]).sum()))
-    }
-
-    fn reciprocal(&self) -> Self {
-        let mut out = [1.0 / self.0[0], 0.0, 0.0, 0.0];
-        for i in 1..4 {
-            let sum: f64 = (1..=i).map(|j| self.0[j] * out[i - j]).sum();
-            out[i] = -sum * out[0];
-        }
-        Self(out)
-    }
-
-    fn exp(&self) -> Self {
-        let mut out = [self.0[0].exp(), 0.0, 0.0, 0.0];
-        for i in 1..4 {
-            let sum: f64 = (1..=i).map(|j| j as f64 * self.0[j] * out[i - j]).sum();
-            out[i] = sum / i as f64;
-        }
-        Self(out)
-    }
 }
 
 #[cfg(test)]

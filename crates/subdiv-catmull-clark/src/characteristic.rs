@@ -1,5 +1,6 @@
 //! Eigenstructure of Catmull-Clark subdivision around an interior vertex.
 
+use numerics::gauss_jordan_rows;
 use std::f64::consts::{PI, TAU};
 
 /// Subdominant eigenvalue of the subdivision matrix of valence `n`
@@ -89,31 +90,9 @@ pub(crate) fn characteristic_map(n: usize, subdivision: &[f64]) -> Vec<[f64; 2]>
             row[7 + axis] = a[..ring].iter().zip(&map).map(|(w, p)| w * p[axis]).sum();
         }
     }
-    solve_in_place(&mut system);
+    gauss_jordan_rows(&mut system);
     map.extend(system.iter().map(|row| [row[7], row[8]]));
     map
-}
-
-// Gauss-Jordan elimination with partial pivoting on 7 equations with two right-hand sides.
-fn solve_in_place(system: &mut [[f64; 9]; 7]) {
-    for k in 0..7 {
-        let mut pivot = k;
-        for i in k + 1..7 {
-            if system[i][k].abs() > system[pivot][k].abs() {
-                pivot = i;
-            }
-        }
-        system.swap(k, pivot);
-        let scale = 1.0 / system[k][k];
-        system[k].iter_mut().for_each(|x| *x *= scale);
-        let row = system[k];
-        for (i, other) in system.iter_mut().enumerate() {
-            if i != k {
-                let factor = other[k];
-                other.iter_mut().zip(&row).for_each(|(x, r)| *x -= factor * r);
-            }
-        }
-    }
 }
 
 #[cfg(test)]

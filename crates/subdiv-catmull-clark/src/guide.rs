@@ -2,6 +2,7 @@
 
 use crate::blend::{septic_step, weight_jet};
 use crate::jet::{JET_LEN, Jet, JetWeights, cubic_basis, jet_index, jet_product, separable_jet};
+use numerics::{gauss_jordan, householder, minimizers};
 use std::f64::consts::TAU;
 
 /// Total degree of the guide.
@@ -271,38 +272,12 @@ pub(crate) fn sample_rows(
     for weights in repair.into_iter().chain([plain]) {
         columns.extend((0..weights.control_points()).map(|k| jet_product(&rest, &weights.jet(k))));
     }
-    solve_jets(&mut system, &mut columns);
+    gauss_jordan(&mut system, &mut columns);
     // |∇³f|² = f_xxx² + 3 f_xxy² + 3 f_xyy² + f_yyy², with f_xxx = 6 c₃₀ and f_xxy = 2 c₂₁.
     let factors = [6.0, 12.0_f64.sqrt(), 12.0_f64.sqrt(), 6.0];
     for (i, factor) in factors.into_iter().enumerate() {
         let scale = factor * (measure * area).sqrt();
         rows.extend(columns.iter().map(|c| scale * c[6 + i]));
-    }
-}
-
-/// Solves `system · x = column` for every column, in place.
-fn solve_jets(system: &mut [[f64; JET_LEN]; JET_LEN], columns: &mut [Jet]) {
-    for k in 0..JET_LEN {
-        let mut pivot = k;
-        for i in k + 1..JET_LEN {
-            if system[i][k].abs() > system[pivot][k].abs() {
-                pivot = i;
-            }
-        }
-        system.swap(k, pivot);
-        columns.iter_mut().for_each(|c| c.swap(k, pivot));
-        for i in 0..JET_LEN {
-            if i != k && system[i][k] != 0.0 {
-                let factor = system[i][k] / system[k][k];
-                for j in k..JET_LEN {
-                    system[i][j] -= factor * system[k][j];
-                }
-                columns.iter_mut().for_each(|c| c[i] -= factor * c[k]);
-            }
-        }
-    }
-    for k in 0..JET_LEN {
-        columns.iter_mut().for_each(|c| c[k] /= system[k][k]);
     }
 }
 
@@ -324,59 +299,6 @@ pub(crate) fn rotated_monomials(angle: f64) -> Vec<f64> {
         }
     }
     out
-}
-
-/// The unknowns that minimise the squares of the rows, as linear functions of the rest:
-/// `unknowns × (width − unknowns)`, row-major.
-pub(crate) fn minimizers(rows: &mut [f64], width: usize, unknowns: usize) -> Vec<f64> {
-    householder(rows, width, unknowns);
-    let points = width - unknowns;
-    let mut out = vec![0.0; unknowns * points];
-    for i in (0..unknowns).rev() {
-        for c in 0..points {
-            let mut value = -rows[i * width + unknowns + c];
-            for k in i + 1..unknowns {
-                value -= rows[i * width + k] * out[k * points + c];
-            }
-            out[i * points + c] = value / rows[i * width + i];
-        }
-    }
-    out
-}
-
-/// Householder QR of the first `pivots` columns of a row-major matrix, applied to all of them; the
-/// triangle ends up in the first rows.
-pub(crate) fn householder(matrix: &mut [f64], width: usize, pivots: usize) {
-    let rows = matrix.len() / width;
-    let mut reflector = vec![0.0; rows];
-    let mut products = vec![0.0; width];
-    for k in 0..pivots {
-        let mut norm = 0.0;
-        for i in k..rows {
-            reflector[i] = matrix[i * width + k];
-            norm += reflector[i] * reflector[i];
-        }
-        let alpha = -reflector[k].signum() * norm.sqrt();
-        reflector[k] -= alpha;
-        let length = norm - matrix[k * width + k].powi(2) + reflector[k].powi(2);
-        if length == 0.0 {
-            continue;
-        }
-        products[k..].fill(0.0);
-        for i in k..rows {
-            let row = &matrix[i * width..(i + 1) * width];
-            for j in k..width {
-                products[j] += reflector[i] * row[j];
-            }
-        }
-        for i in k..rows {
-            let factor = 2.0 * reflector[i] / length;
-            let row = &mut matrix[i * width..(i + 1) * width];
-            for j in k..width {
-                row[j] -= factor * products[j];
-            }
-        }
-    }
 }
 
 #[cfg(test)]

@@ -3,10 +3,10 @@
 use crate::blend::septic_step;
 use crate::characteristic::{characteristic_ring, subdominant_eigenvalue};
 use crate::guide::{
-    CELLS, GAUSS_6, MONOMIALS, coordinate_jets, householder, minimizers, monomial_jets,
-    rotated_monomials, sample_rows,
+    CELLS, GAUSS_6, MONOMIALS, coordinate_jets, monomial_jets, rotated_monomials, sample_rows,
 };
 use crate::jet::{Jet, JetWeights, cubic_basis, jet_product, separable_jet};
+use numerics::{householder, minimizers};
 use std::f64::consts::TAU;
 
 /// A patch of a sector: its lower corner stands at `(a, b)`, the extraordinary vertex at `(0, 0)`.

@@ -1,8 +1,7 @@
 //! B-spline curves in the curvature diagram: fit, foot points, tangent lines.
 
 use bspline::{Degree, KnotVector};
-
-use crate::dense;
+use numerics::lu_solve;
 
 /// Control points of a fitted curve.
 const CONTROL: usize = 8;
@@ -93,7 +92,7 @@ impl DiagramCurve {
                 }
             }
         }
-        if !dense::solve(&mut matrix, &mut values, n) {
+        if !lu_solve(&mut matrix, &mut values, n) {
             return None;
         }
         self.control = values.chunks_exact(2).map(|c| [c[0], c[1]]).collect();

@@ -1,12 +1,12 @@
 //! Position, metric and curvatures with their derivatives at every sample of a grid.
 
 use glam::DVec3;
+use numerics::{Lanes, Triple};
 use pulp::Simd;
 use rayon::prelude::*;
 
 use crate::grid::SampleGrid;
 use crate::kernel::{CurvatureJet, FIRST, FOURTH, Field, THIRD, curvature_jet, parallel_jet};
-use crate::real::{Lanes, Triple};
 use crate::sweep::{LaneKernel, Scratch, store};
 
 /// What the surface is like at one sample.

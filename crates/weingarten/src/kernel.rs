@@ -8,7 +8,7 @@
 //! No closures here: one that is not inlined is compiled without the vector instructions of its
 //! caller, and every operation in it becomes a call.
 
-use crate::real::{Dual, Real, Triple, dual, slope};
+use numerics::{Dual, Real, Triple};
 
 /// Number of derivative vectors up to first order, the position included.
 pub(crate) const FIRST: usize = 3;
@@ -86,7 +86,7 @@ fn forms<T: Real>(p: &Second<T>) -> Forms<T> {
 fn pull_back<T: Real>(p: &Second<T>, n: Triple<T>, lmq: [T; 3], delta: T) -> Second<T> {
     let [a, b, c, d, w] = *p;
     let [l, m, q] = lmq;
-    let nb = n.scale(delta.scale(2.0)).plus(l, c).plus(m, d).plus(q, w);
+    let nb = n.scale(delta * 2.0).plus(l, c).plus(m, d).plus(q, w);
     [b.cross(nb), nb.cross(a), n.scale(l), n.scale(m), n.scale(q)]
 }
 
@@ -94,13 +94,13 @@ fn pull_back<T: Real>(p: &Second<T>, n: Triple<T>, lmq: [T; 3], delta: T) -> Sec
 #[inline(always)]
 fn mean_with_gradient<T: Real>(p: &Second<T>) -> (T, Second<T>) {
     let Forms { n, e, f, g, l, m, q, inv } = forms(p);
-    let factor = (inv * inv.sqrt()).scale(0.5);
-    let h = (l * g + q * e - (m * f).scale(2.0)) * factor;
-    let lmq = [g * factor, -(f * factor).scale(2.0), e * factor];
-    let mut grad = pull_back(p, n, lmq, -(h * inv).scale(1.5));
-    let (fe, ff, fg) = (q * factor, -(m * factor).scale(2.0), l * factor);
-    grad[0] = grad[0].plus(fe.scale(2.0), p[0]).plus(ff, p[1]);
-    grad[1] = grad[1].plus(fg.scale(2.0), p[1]).plus(ff, p[0]);
+    let factor = inv * inv.sqrt() * 0.5;
+    let h = (l * g + q * e - m * f * 2.0) * factor;
+    let lmq = [g * factor, -(f * factor) * 2.0, e * factor];
+    let mut grad = pull_back(p, n, lmq, -(h * inv) * 1.5);
+    let (fe, ff, fg) = (q * factor, -(m * factor) * 2.0, l * factor);
+    grad[0] = grad[0].plus(fe * 2.0, p[0]).plus(ff, p[1]);
+    grad[1] = grad[1].plus(fg * 2.0, p[1]).plus(ff, p[0]);
     (h, grad)
 }
 
@@ -110,8 +110,8 @@ fn gauss_with_gradient<T: Real>(p: &Second<T>) -> (T, Second<T>) {
     let Forms { n, l, m, q, inv, .. } = forms(p);
     let inv2 = inv * inv;
     let k = (l * q - m * m) * inv2;
-    let lmq = [q * inv2, -(m * inv2).scale(2.0), l * inv2];
-    (k, pull_back(p, n, lmq, -(k * inv).scale(2.0)))
+    let lmq = [q * inv2, -(m * inv2) * 2.0, l * inv2];
+    (k, pull_back(p, n, lmq, -(k * inv) * 2.0))
 }
 
 /// Mean and Gaussian curvature with gradients.
@@ -168,10 +168,10 @@ fn combine<T: Real, const N: usize>(
 fn dual_array<T: Real, const N: usize>(
     x: &[Triple<T>; N],
     direction: &[Triple<T>; N],
-) -> [Triple<Dual<T>>; N] {
-    let mut result = [dual(x[0], direction[0]); N];
+) -> [Triple<Dual<1, T>>; N] {
+    let mut result = [x[0].towards(direction[0]); N];
     for i in 1..N {
-        result[i] = dual(x[i], direction[i]);
+        result[i] = x[i].towards(direction[i]);
     }
     result
 }
@@ -222,7 +222,7 @@ pub(crate) fn alignment<T: Real>(d: &[Triple<T>; THIRD]) -> (T, [Triple<T>; THIR
     let by_v = combine(h_u, &c.grad_k, -k_u, &c.grad_h);
     let mut grad = [d[0].zero(); THIRD];
     for i in 0..5 {
-        grad[1 + i] = slope(hess_h[i]) + slope(hess_k[i]);
+        grad[1 + i] = hess_h[i].slope() + hess_k[i].slope();
     }
     add_shifted(&mut grad, &by_u, &by_v);
     (h_u * k_v - h_v * k_u, grad)
@@ -274,20 +274,20 @@ fn gradient_norm<T: Real>(field: Field, d: &[Triple<T>; 9]) -> (T, [Triple<T>; 9
     let (fu, fv) = (inner(&gradient, &pu), inner(&gradient, &pv));
     let (e, f, g) = (p[0].dot(p[0]), p[0].dot(p[1]), p[1].dot(p[1]));
     let inv = (e * g - f * f).recip();
-    let psi = (g * fu * fu - (f * fu * fv).scale(2.0) + e * fv * fv) * inv;
-    let alpha = ((g * fu - f * fv) * inv).scale(2.0);
-    let beta = ((e * fv - f * fu) * inv).scale(2.0);
+    let psi = (g * fu * fu - f * fu * fv * 2.0 + e * fv * fv) * inv;
+    let alpha = (g * fu - f * fv) * inv * 2.0;
+    let beta = (e * fv - f * fu) * inv * 2.0;
     let by_e = (fv * fv - psi * g) * inv;
-    let by_f = ((psi * f - fu * fv) * inv).scale(2.0);
+    let by_f = (psi * f - fu * fv) * inv * 2.0;
     let by_g = (fu * fu - psi * e) * inv;
     let along = combine(alpha, &pu, beta, &pv);
     let hessian = field_with_gradient(field, &dual_array(&p, &along)).1;
     let mut grad = [d[0].zero(); 9];
     for i in 0..5 {
-        grad[i] = slope(hessian[i]);
+        grad[i] = hessian[i].slope();
     }
-    grad[0] = grad[0].plus(by_e.scale(2.0), p[0]).plus(by_f, p[1]);
-    grad[1] = grad[1].plus(by_g.scale(2.0), p[1]).plus(by_f, p[0]);
+    grad[0] = grad[0].plus(by_e * 2.0, p[0]).plus(by_f, p[1]);
+    grad[1] = grad[1].plus(by_g * 2.0, p[1]).plus(by_f, p[0]);
     for (slot, value) in [2, 3, 5, 6, 7].into_iter().zip(&gradient) {
         grad[slot] = grad[slot].plus(alpha, *value);
     }
@@ -356,10 +356,10 @@ pub(crate) fn parallel<T: Real>(field: Field, d: &[Triple<T>; FOURTH]) -> (T, [T
     let hess_f = field_with_gradient(field, &dual_array(&p, &along)).1;
     let mut grad = [d[0].zero(); FOURTH];
     for i in 0..9 {
-        grad[1 + i] = slope(hess_psi[i]);
+        grad[1 + i] = hess_psi[i].slope();
     }
     for i in 0..5 {
-        grad[1 + i] = grad[1 + i] + slope(hess_f[i]);
+        grad[1 + i] = grad[1 + i] + hess_f[i].slope();
     }
     for i in 0..9 {
         grad[SHIFT_U[i]] = grad[SHIFT_U[i]].plus(f_v, grad_psi[i]);

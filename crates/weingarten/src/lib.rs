@@ -28,7 +28,6 @@
 mod axis;
 pub mod blocks;
 mod curve;
-mod dense;
 mod error;
 mod field;
 mod grid;
@@ -39,7 +38,6 @@ mod locus;
 mod metrics;
 mod options;
 mod rational;
-mod real;
 mod relation;
 mod sampled;
 mod schedule;

@@ -12,6 +12,7 @@
 use std::sync::Arc;
 
 use gp_solver::{Elements, Problem, QuadraticBuilder, QuadraticConstraints, ResidualBlock};
+use numerics::{Lanes, Triple};
 use rayon::prelude::*;
 
 use crate::error::Error;
@@ -19,7 +20,6 @@ use crate::grid::{SampleGrid, split_runs};
 use crate::kernel::SECOND;
 use crate::level::Level;
 use crate::options::Options;
-use crate::real::{Lanes, Triple};
 use crate::sampled::regular_samples;
 use crate::sweep::{LaneKernel, Scratch, store};
 use crate::variables::{bordered, coordinates};

@@ -3,11 +3,11 @@
 
 use std::ops::Range;
 
+use numerics::{Lanes, Triple};
 use pulp::{Simd, WithSimd};
 
 use crate::grid::SampleGrid;
 use crate::kernel::{ORDERS, SECOND};
-use crate::real::{Lanes, Triple};
 use crate::tensor::{Differentiate, ExpandRow, ExpandSample};
 
 /// Buffers of one worker.
@@ -36,8 +36,7 @@ impl<const N: usize, K: LaneKernel<N>> WithSimd for Sweep<'_, N, K> {
     fn with_simd<S: Simd>(self, simd: S) {
         let lanes = S::F64_LANES;
         for at in (0..self.stride).step_by(lanes) {
-            let zero = Lanes::new(simd, simd.splat_f64s(0.0));
-            let mut d = [Triple { x: zero, y: zero, z: zero }; N];
+            let mut d = [Triple::splat(Lanes::splat(simd, 0.0)); N];
             for (vector, rows) in d.iter_mut().zip(self.derivatives.chunks_exact(3 * self.stride)) {
                 vector.x = load(simd, &rows[..self.stride], at);
                 vector.y = load(simd, &rows[self.stride..2 * self.stride], at);

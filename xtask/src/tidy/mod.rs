@@ -2,6 +2,7 @@
 
 mod circles;
 mod dependencies;
+mod numerics;
 mod sources;
 mod stray_words;
 mod tokens;
@@ -20,6 +21,7 @@ pub(crate) fn run() -> Outcome {
         let shown = path.strip_prefix(root()).unwrap_or(&path).display().to_string();
         if path.extension().is_some_and(|e| e == "rs") {
             sources::check(&shown, &text, &references, &mut faults);
+            numerics::check(&shown, &text, &mut faults);
         }
         stray_words::check(&shown, &text, &mut faults);
     }

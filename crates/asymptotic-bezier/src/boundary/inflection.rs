@@ -10,7 +10,7 @@ use geom_core::DVec3;
 
 use crate::curve::bernstein::{derivative, eval};
 use crate::curve::bezier::BezierCurve;
-use geom_core::linalg::{Matrix, affine_space, norm};
+use numerics::{Matrix, affine_space, norm};
 
 /// Relative residual at which the equations count as solved.
 const TOL: f64 = 1e-13;

@@ -15,7 +15,7 @@ use crate::curve::bernstein;
 use crate::curve::bezier::BezierCurve;
 use crate::data::corners::{CURVE_CORNERS, CornerData, DATA_DEGREE, INTO_IS_LEFT};
 use crate::error::{AsymptoticError, Place};
-use geom_core::linalg::{Matrix, affine_space, minimize_quadratic, norm};
+use numerics::{Matrix, affine_space, minimize_quadratic, norm};
 
 /// Sine between the corner planes below which they have no common line.
 const PLANE_TOL: f64 = 1e-9;

@@ -22,7 +22,7 @@ use crate::data::vertex::{
     PLANE_TOL, VertexFrame, arm_signs, bilinear_torsions, curve_families, vertex_frames,
 };
 use crate::error::{AsymptoticError, AsymptoticWarning};
-use geom_core::linalg::{AffineSpace, Cholesky, Matrix, affine_space, dot};
+use numerics::{AffineSpace, Cholesky, Matrix, affine_space, dot};
 
 /// A coefficient of a torsion equation this small, relative to the curve's size, is no coefficient.
 const VACUOUS_TOL: f64 = 1e-10;

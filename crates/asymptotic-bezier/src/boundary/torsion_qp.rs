@@ -1,7 +1,7 @@
 //! The sparse quadratic programme of the vertex torsions, with simple bounds.
 
-use geom_core::linalg::{Matrix, axpy, minimize_quadratic};
 use gp_solver::{SolverError, SparseCholesky, SymmetricPattern};
+use numerics::{Matrix, axpy, minimize_quadratic};
 
 /// Up to this many free unknowns the system is solved densely.
 const DENSE_LIMIT: usize = 64;

@@ -2,7 +2,7 @@
 
 use geom_core::DVec3;
 
-use geom_core::linalg::Matrix;
+use numerics::Matrix;
 
 /// Highest degree the binomial table holds: products of two derivatives of bi-15 fields.
 const MAX_DEGREE: usize = 64;

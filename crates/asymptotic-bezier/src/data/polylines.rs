@@ -2,7 +2,8 @@
 
 use std::collections::BTreeSet;
 
-use geom_core::{DVec3, least_squares};
+use geom_core::DVec3;
+use numerics::least_squares;
 
 use crate::data::corners::{AsymptoticNet, NetCurve};
 use crate::data::net::net_curve;

@@ -73,7 +73,7 @@ mod tests {
         // Radius 1, pitch slope 0.5, one radian, interpolated by a degree-nine polynomial.
         let n = 9;
         let points: Vec<DVec3> = {
-            let mut matrix = geom_core::linalg::Matrix::zeros(n + 1, n + 1);
+            let mut matrix = numerics::Matrix::zeros(n + 1, n + 1);
             for r in 0..=n {
                 let basis = crate::curve::bernstein::bernstein(n, r as f64 / n as f64);
                 matrix.row_mut(r).copy_from_slice(&basis);
@@ -81,7 +81,7 @@ mod tests {
             let helix = |t: f64| DVec3::new(t.cos(), t.sin(), 0.5 * t);
             let solve = |axis: usize| {
                 let b: Vec<f64> = (0..=n).map(|r| helix(r as f64 / n as f64)[axis]).collect();
-                geom_core::linalg::affine_space(&matrix, &b, &[1.0; 10], 1e-14).particular
+                numerics::affine_space(&matrix, &b, &[1.0; 10], 1e-14).particular
             };
             let (x, y, z) = (solve(0), solve(1), solve(2));
             (0..=n).map(|k| DVec3::new(x[k], y[k], z[k])).collect()

@@ -4,8 +4,8 @@ use geom_core::DVec3;
 
 use crate::boundary::four_curves::PatchBoundary;
 use crate::patch::family::PatchFamily;
-use geom_core::linalg::axpy;
 use gp_solver::{DenseQp, Status};
+use numerics::axpy;
 
 /// Samples per curve at which the bounds are imposed.
 const SAMPLES: usize = 41;

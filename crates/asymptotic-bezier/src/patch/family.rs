@@ -10,7 +10,7 @@ use crate::patch::field::{FieldSpace, paper_ansatz, tangent_fields};
 use crate::patch::options::Ansatz;
 use crate::patch::surface::Patch;
 use crate::patch::thin_plate::fill_table;
-use geom_core::linalg::{Matrix, affine_space, axpy, dot};
+use numerics::{Matrix, affine_space, axpy, dot};
 
 /// Rank tolerance of the corner equations after scaling of the columns.
 pub(crate) const RANK_TOL: f64 = 1e-10;

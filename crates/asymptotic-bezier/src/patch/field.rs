@@ -11,7 +11,7 @@
 //! The ansatz of Wang et al. 2019, Eq. 4.1, `x r′ + y (r′ × r″) × r′`, is kept for comparison.
 
 use geom_core::DVec3;
-use geom_core::linalg::{Matrix, affine_space};
+use numerics::{Matrix, affine_space};
 
 use crate::curve::bernstein::{
     binomial, cross, derivative, divide_by_root, elevate, eval, times_basis,
@@ -268,7 +268,7 @@ mod tests {
                     gram[(i, j)] = a.iter().zip(b).map(|(a, b)| a.dot(*b)).sum();
                 }
             }
-            assert!(geom_core::linalg::Cholesky::new(&gram, 1e-6).is_some());
+            assert!(numerics::Cholesky::new(&gram, 1e-6).is_some());
         }
     }
 

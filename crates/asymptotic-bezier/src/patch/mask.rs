@@ -6,7 +6,7 @@
 
 use crate::curve::bernstein::gram;
 use crate::patch::surface::Patch;
-use geom_core::linalg::{Matrix, affine_space, dot};
+use numerics::{Matrix, affine_space, dot};
 
 /// How the inner control points are found.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]

@@ -1,7 +1,7 @@
 //! Fills a boundary: the freedoms of least energy, bounds where the patch would fold, higher degrees
 //! where bounds do not help.
 
-use geom_core::linalg::minimize_quadratic;
+use numerics::minimize_quadratic;
 
 use crate::boundary::four_curves::PatchBoundary;
 use crate::error::{AsymptoticError, AsymptoticWarning, Place};

@@ -7,7 +7,7 @@
 use std::sync::OnceLock;
 
 use crate::curve::bernstein::gram;
-use geom_core::linalg::{Cholesky, Matrix};
+use numerics::{Cholesky, Matrix};
 
 /// Highest surface degree.
 pub const MAX_SURFACE_DEGREE: usize = 15;
@@ -109,9 +109,9 @@ mod tests {
             {
                 assert!((got - want).abs() < bound, "bi-{n}: {}", (got - want).abs());
             }
-            let energy = geom_core::linalg::dot(&table.border_border.apply(&border), &border)
-                + 2.0 * geom_core::linalg::dot(&table.second_border.apply(&border), &second)
-                + geom_core::linalg::dot(&table.second_second.apply(&second), &second);
+            let energy = numerics::dot(&table.border_border.apply(&border), &border)
+                + 2.0 * numerics::dot(&table.second_border.apply(&border), &second)
+                + numerics::dot(&table.second_second.apply(&second), &second);
             assert!((energy - 2.0).abs() < 1e-9, "bi-{n}: {energy}");
         }
     }

@@ -11,8 +11,8 @@
 //! agree at the vertices, which nets of one smooth surface have) and is least elsewhere.
 
 use geom_core::DVec3;
-use geom_core::linalg::{Matrix, affine_space, axpy};
 use gp_solver::{SolverError, SparseCholesky, SymmetricPattern};
+use numerics::{Matrix, affine_space, axpy};
 use rayon::prelude::*;
 
 use crate::boundary::four_curves::PatchBoundary;

@@ -3,8 +3,8 @@
 use std::f64::consts::TAU;
 
 use asymptotic_bezier::{AsymptoticNet, NetCurve};
-use geom_core::linalg::{Matrix, affine_space};
 use geom_core::{DMat3, DVec3};
+use numerics::{Matrix, affine_space};
 
 /// Curvature of the arms, bending to the left, and size of the torsion at their outer ends.
 const ARM: [f64; 2] = [0.45, 0.5];

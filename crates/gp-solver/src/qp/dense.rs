@@ -2,8 +2,8 @@
 
 use super::QpSolution;
 use crate::error::SolverError;
-use crate::lbfgs::dot;
 use crate::report::Status;
+use numerics::{Matrix, cholesky, dot};
 
 /// Smallest violation, relative to the size of the constraint's numbers, that counts as one.
 const VIOLATION_TOL: f64 = 1e-13;
@@ -98,12 +98,12 @@ impl DenseQp {
             let name = "coefficient of the quadratic program";
             return Err(SolverError::BadOption { name, value, need: "finite" });
         }
-        if let Ok(l) = cholesky(&self.hessian, n, 0.0) {
+        if let Ok(l) = factor(&self.hessian, n, 0.0) {
             return Ok(self.finish(ActiveSet::new(self, &l, &self.linear).run()));
         }
         let size = (0..n).map(|i| self.hessian[i * n + i].abs()).fold(0.0, f64::max);
         let shift = PROXIMITY * if size > 0.0 { size } else { 1.0 };
-        let l = cholesky(&self.hessian, n, shift)?;
+        let l = factor(&self.hessian, n, shift)?;
         let mut x = vec![0.0; n];
         let mut iterations = 0;
         for round in 1.. {
@@ -138,25 +138,10 @@ impl DenseQp {
     }
 }
 
-/// Row-major lower Cholesky factor of `hessian + shift I`.
-fn cholesky(hessian: &[f64], n: usize, shift: f64) -> Result<Vec<f64>, SolverError> {
-    let mut l = vec![0.0; n * n];
-    let size = (0..n).map(|i| hessian[i * n + i].abs()).fold(0.0, f64::max);
-    for i in 0..n {
-        for j in 0..=i {
-            let mut sum = hessian[i * n + j] - dot(&l[i * n..i * n + j], &l[j * n..j * n + j]);
-            if i == j {
-                sum += shift;
-                if !(sum > 1e-13 * size) {
-                    return Err(SolverError::NotPositiveDefinite { variable: i });
-                }
-                l[i * n + i] = sum.sqrt();
-            } else {
-                l[i * n + j] = sum / l[j * n + j];
-            }
-        }
-    }
-    Ok(l)
+/// Lower Cholesky factor of `hessian + shift I`.
+fn factor(hessian: &[f64], n: usize, shift: f64) -> Result<Matrix, SolverError> {
+    cholesky(hessian, n, shift, 1e-13)
+        .map_err(|e| SolverError::NotPositiveDefinite { variable: e.row })
 }
 
 /// State of the dual method: `j` is `n × n` by columns with `Jᵀ Q J = I`, its first `q` columns
@@ -175,15 +160,15 @@ struct ActiveSet<'q> {
 }
 
 impl<'q> ActiveSet<'q> {
-    fn new(qp: &'q DenseQp, l: &[f64], linear: &[f64]) -> Self {
+    fn new(qp: &'q DenseQp, l: &Matrix, linear: &[f64]) -> Self {
         let n = qp.n;
         // J = L⁻ᵀ, column k solves Lᵀ J_k = e_k.
         let mut j = vec![0.0; n * n];
         for k in 0..n {
             for i in (0..=k).rev() {
-                let sum: f64 = (i + 1..=k).map(|m| l[m * n + i] * j[k * n + m]).sum();
+                let sum: f64 = (i + 1..=k).map(|m| l[(m, i)] * j[k * n + m]).sum();
                 let unit = if i == k { 1.0 } else { 0.0 };
-                j[k * n + i] = (unit - sum) / l[i * n + i];
+                j[k * n + i] = (unit - sum) / l[(i, i)];
             }
         }
         // x = −J Jᵀ c.

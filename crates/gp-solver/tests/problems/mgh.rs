@@ -1,8 +1,8 @@
 //! The 35 least-squares problems of Moré, Garbow and Hillstrom 1981, at their sizes.
 
-use super::Dense;
-use super::dual::Dual;
 use super::nist;
+use super::{Dense, Dual};
+use numerics::{Number, Real};
 
 /// A problem and its known minima (sums of squares), local ones included.
 pub struct Mgh {
@@ -107,7 +107,9 @@ pub fn all() -> Vec<Mgh> {
     add(
         1,
         &[0.0],
-        Dense::new("Rosenbrock", vec![-1.2, 1.0], |x| vec![10.0 * (x[1] - x[0].sq()), 1.0 - x[0]]),
+        Dense::new("Rosenbrock", vec![-1.2, 1.0], |x| {
+            vec![10.0 * (x[1] - x[0].powi(2)), 1.0 - x[0]]
+        }),
     );
     add(
         2,
@@ -155,8 +157,12 @@ pub fn all() -> Vec<Mgh> {
         &[0.0],
         Dense::new("Helical valley", vec![-1.0, 0.0, 0.0], |x| {
             let turn = (x[1] / x[0]).atan() / std::f64::consts::TAU;
-            let angle = if x[0].v > 0.0 { turn } else { turn + 0.5 };
-            vec![10.0 * (x[2] - 10.0 * angle), 10.0 * ((x[0].sq() + x[1].sq()).sqrt() - 1.0), x[2]]
+            let angle = if x[0].value > 0.0 { turn } else { turn + 0.5 };
+            vec![
+                10.0 * (x[2] - 10.0 * angle),
+                10.0 * ((x[0].powi(2) + x[1].powi(2)).sqrt() - 1.0),
+                x[2],
+            ]
         }),
     );
     add(
@@ -179,7 +185,7 @@ pub fn all() -> Vec<Mgh> {
                 .map(|i| {
                     let t = (8.0 - f(i)) / 2.0;
                     let y = GAUSSIAN[(i - 1).min(15 - i)];
-                    x[0] * (-x[1] * (t - x[2]).sq() / 2.0).exp() - y
+                    x[0] * (-x[1] * (t - x[2]).powi(2) / 2.0).exp() - y
                 })
                 .collect()
         }),
@@ -201,7 +207,7 @@ pub fn all() -> Vec<Mgh> {
                 .map(|i| {
                     let t = f(i) / 100.0;
                     let y = 25.0 + (-50.0 * t.ln()).powf(2.0 / 3.0);
-                    (-(y - x[1]).abs().pow(x[2]) / x[0]).exp() - t
+                    (-(y - x[1]).abs().powf(x[2]) / x[0]).exp() - t
                 })
                 .collect()
         }),
@@ -224,9 +230,9 @@ pub fn all() -> Vec<Mgh> {
         &[0.0],
         Dense::new("Wood", vec![-3.0, -1.0, -3.0, -1.0], |x| {
             vec![
-                10.0 * (x[1] - x[0].sq()),
+                10.0 * (x[1] - x[0].powi(2)),
                 1.0 - x[0],
-                90_f64.sqrt() * (x[3] - x[2].sq()),
+                90_f64.sqrt() * (x[3] - x[2].powi(2)),
                 1.0 - x[2],
                 10_f64.sqrt() * (x[1] + x[3] - 2.0),
                 (x[1] - x[3]) / 10_f64.sqrt(),
@@ -252,7 +258,7 @@ pub fn all() -> Vec<Mgh> {
             (1..=20)
                 .map(|i| {
                     let t = f(i) / 5.0;
-                    (x[0] + t * x[1] - t.exp()).sq() + (x[2] + x[3] * t.sin() - t.cos()).sq()
+                    (x[0] + t * x[1] - t.exp()).powi(2) + (x[2] + x[3] * t.sin() - t.cos()).powi(2)
                 })
                 .collect()
         }),
@@ -291,7 +297,7 @@ pub fn all() -> Vec<Mgh> {
                 (0..65)
                     .map(|i| {
                         let t = f(i) / 10.0;
-                        let bell = |k: usize| x[k] * (-(t - x[k + 7]).sq() * x[k + 4]).exp();
+                        let bell = |k: usize| x[k] * (-(t - x[k + 7]).powi(2) * x[k + 4]).exp();
                         OSBORNE_2[i] - (x[0] * (-t * x[4]).exp() + bell(1) + bell(2) + bell(3))
                     })
                     .collect()
@@ -307,7 +313,7 @@ pub fn all() -> Vec<Mgh> {
         21,
         &[0.0],
         Dense::new("Extended Rosenbrock 10", repeat(&[-1.2, 1.0], 5), |x| {
-            x.chunks(2).flat_map(|p| [10.0 * (p[1] - p[0].sq()), 1.0 - p[0]]).collect()
+            x.chunks(2).flat_map(|p| [10.0 * (p[1] - p[0].powi(2)), 1.0 - p[0]]).collect()
         }),
     );
     add(
@@ -324,7 +330,7 @@ pub fn all() -> Vec<Mgh> {
             &[minimum],
             Dense::new(format!("Penalty I {n}"), start, |x| {
                 let mut r: Vec<Dual> = x.iter().map(|&x| 1e-5_f64.sqrt() * (x - 1.0)).collect();
-                r.push(x.iter().map(|x| x.sq()).sum::<Dual>() - 0.25);
+                r.push(x.iter().map(|x| x.powi(2)).sum::<Dual>() - 0.25);
                 r
             }),
         );
@@ -343,7 +349,7 @@ pub fn all() -> Vec<Mgh> {
                 for i in 1..n {
                     r.push(a * ((x[i] / 10.0).exp() - (-0.1_f64).exp()));
                 }
-                r.push((0..n).map(|j| f(n - j) * x[j].sq()).sum::<Dual>() - 1.0);
+                r.push((0..n).map(|j| f(n - j) * x[j].powi(2)).sum::<Dual>() - 1.0);
                 r
             }),
         );
@@ -355,7 +361,7 @@ pub fn all() -> Vec<Mgh> {
         Dense::new("Variably dimensioned 10", start, move |x| {
             let mut r: Vec<Dual> = x.iter().map(|&x| x - 1.0).collect();
             let sum: Dual = x.iter().enumerate().map(|(j, &x)| f(j + 1) * (x - 1.0)).sum();
-            r.extend([sum, sum.sq()]);
+            r.extend([sum, sum.powi(2)]);
             r
         }),
     );
@@ -437,7 +443,7 @@ pub fn all() -> Vec<Mgh> {
                 .map(|i| {
                     let near = (i.saturating_sub(5)..(i + 2).min(10)).filter(|&j| j != i);
                     let sum: Dual = near.map(|j| x[j] * (1.0 + x[j])).sum();
-                    x[i] * (2.0 + 5.0 * x[i].sq()) + 1.0 - sum
+                    x[i] * (2.0 + 5.0 * x[i].powi(2)) + 1.0 - sum
                 })
                 .collect()
         }),
@@ -504,8 +510,8 @@ fn powell_singular(x: &[Dual]) -> Vec<Dual> {
     vec![
         x[0] + 10.0 * x[1],
         5_f64.sqrt() * (x[2] - x[3]),
-        (x[1] - 2.0 * x[2]).sq(),
-        10_f64.sqrt() * (x[0] - x[3]).sq(),
+        (x[1] - 2.0 * x[2]).powi(2),
+        10_f64.sqrt() * (x[0] - x[3]).powi(2),
     ]
 }
 
@@ -516,7 +522,7 @@ fn chebyquad(x: &[Dual], m: usize) -> Vec<Dual> {
         let y = 2.0 * x - 1.0;
         let (mut before, mut here) = (Dual::from(1.0), y);
         for r in &mut r {
-            *r = *r + here / n;
+            *r += here / n;
             (before, here) = (here, 2.0 * y * here - before);
         }
     }
@@ -532,9 +538,9 @@ fn watson(x: &[Dual]) -> Vec<Dual> {
             let t = f64::from(i) / 29.0;
             let value: Dual = x.iter().rev().fold(Dual::from(0.0), |s, &x| s * t + x);
             let slope: Dual = (1..x.len()).map(|j| j as f64 * x[j] * t.powi(j as i32 - 1)).sum();
-            slope - value.sq() - 1.0
+            slope - value.powi(2) - 1.0
         })
         .collect();
-    r.extend([x[0], x[1] - x[0].sq() - 1.0]);
+    r.extend([x[0], x[1] - x[0].powi(2) - 1.0]);
     r
 }

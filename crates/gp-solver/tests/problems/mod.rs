@@ -2,15 +2,16 @@
 #![allow(dead_code, reason = "each test program uses its part")]
 #![allow(unreachable_pub, reason = "a module shared by test programs, not a library")]
 
-pub mod dual;
 pub mod lifted;
 pub mod mgh;
 pub mod minpack;
 pub mod nist;
 pub mod quadratic;
 
-use dual::Dual;
 use gp_solver::{Elements, Options, Problem, Report, ResidualBlock, SolverError, solve};
+
+/// A number with one derivative.
+pub type Dual = numerics::Dual<1>;
 
 /// Residuals as a function of the unknowns.
 pub type Function = Box<dyn Fn(&[Dual]) -> Vec<Dual> + Send + Sync>;
@@ -78,7 +79,7 @@ impl Dense {
     pub fn residuals(&self, x: &[f64], residuals: &mut [f64]) {
         let x: Vec<Dual> = x.iter().map(|&v| Dual::from(v)).collect();
         for (to, from) in residuals.iter_mut().zip((self.function)(&x)) {
-            *to = from.v;
+            *to = from.value;
         }
     }
 
@@ -86,12 +87,12 @@ impl Dense {
         let n = x.len();
         let mut x: Vec<Dual> = x.iter().map(|&v| Dual::from(v)).collect();
         for k in 0..n {
-            x[k].d = 1.0;
+            x[k].partials[0] = 1.0;
             for (i, r) in (self.function)(&x).into_iter().enumerate() {
-                residuals[i] = r.v;
-                jacobian[i * n + k] = r.d;
+                residuals[i] = r.value;
+                jacobian[i * n + k] = r.partials[0];
             }
-            x[k].d = 0.0;
+            x[k].partials[0] = 0.0;
         }
     }
 }

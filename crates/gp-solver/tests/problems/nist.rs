@@ -1,7 +1,7 @@
 //! NIST StRD nonlinear regression (the files in `fixtures/nist`).
 
-use super::Dense;
-use super::dual::Dual;
+use super::{Dense, Dual};
+use numerics::Number;
 use std::path::PathBuf;
 
 /// Difficulty as NIST grades it.
@@ -33,7 +33,7 @@ pub const MODELS: [(&str, Model); 27] = [
     ("Lanczos3", lanczos),
     ("Gauss1", gauss),
     ("Gauss2", gauss),
-    ("DanWood", |b, x| b[0] * Dual::from(x[0]).pow(b[1])),
+    ("DanWood", |b, x| b[0] * Dual::from(x[0]).powf(b[1])),
     ("Misra1b", |b, x| b[0] * (1.0 - (1.0 + b[1] * x[0] / 2.0).powi(-2))),
     ("Kirby2", |b, x| polynomial(&b[..3], x[0]) / (1.0 + polynomial(&b[3..], x[0]) * x[0])),
     ("Hahn1", |b, x| polynomial(&b[..4], x[0]) / (1.0 + polynomial(&b[4..], x[0]) * x[0])),
@@ -42,7 +42,7 @@ pub const MODELS: [(&str, Model); 27] = [
     ("Lanczos1", lanczos),
     ("Lanczos2", lanczos),
     ("Gauss3", gauss),
-    ("Misra1c", |b, x| b[0] * (1.0 - (1.0 + 2.0 * b[1] * x[0]).pow(Dual::from(-0.5)))),
+    ("Misra1c", |b, x| b[0] * (1.0 - (1.0 + 2.0 * b[1] * x[0]).powf(Dual::from(-0.5)))),
     ("Misra1d", |b, x| b[0] * b[1] * x[0] / (1.0 + b[1] * x[0])),
     ("Roszman1", |b, x| b[0] - b[1] * x[0] - (b[2] / (x[0] - b[3])).atan() / std::f64::consts::PI),
     ("ENSO", |b, x| {
@@ -57,9 +57,9 @@ pub const MODELS: [(&str, Model); 27] = [
     ("BoxBOD", |b, x| b[0] * (1.0 - (-b[1] * x[0]).exp())),
     ("Rat42", |b, x| b[0] / (1.0 + (b[1] - b[2] * x[0]).exp())),
     ("MGH10", |b, x| b[0] * (b[1] / (x[0] + b[2])).exp()),
-    ("Eckerle4", |b, x| b[0] / b[1] * (-0.5 * ((x[0] - b[2]) / b[1]).sq()).exp()),
-    ("Rat43", |b, x| b[0] / (1.0 + (b[1] - b[2] * x[0]).exp()).pow(1.0 / b[3])),
-    ("Bennett5", |b, x| b[0] * (b[1] + x[0]).pow(-1.0 / b[2])),
+    ("Eckerle4", |b, x| b[0] / b[1] * (-0.5 * ((x[0] - b[2]) / b[1]).powi(2)).exp()),
+    ("Rat43", |b, x| b[0] / (1.0 + (b[1] - b[2] * x[0]).exp()).powf(1.0 / b[3])),
+    ("Bennett5", |b, x| b[0] * (b[1] + x[0]).powf(-1.0 / b[2])),
 ];
 
 fn polynomial(b: &[Dual], x: f64) -> Dual {
@@ -71,7 +71,7 @@ fn lanczos(b: &[Dual], x: &[f64]) -> Dual {
 }
 
 fn gauss(b: &[Dual], x: &[f64]) -> Dual {
-    let bell = |k: usize| b[k] * (-((x[0] - b[k + 1]) / b[k + 2]).sq()).exp();
+    let bell = |k: usize| b[k] * (-((x[0] - b[k + 1]) / b[k + 2]).powi(2)).exp();
     b[0] * (-b[1] * x[0]).exp() + bell(2) + bell(5)
 }
 

@@ -8,7 +8,7 @@ use crate::fit::state::{EXACT, Fit};
 use crate::fit::torus_start;
 use crate::layout::panels::{PanelSet, Pose};
 use crate::mold::shape::{MAX_PARAMETERS, Mold, MoldType};
-use crate::small::{accumulate, solve_spd};
+use numerics::{PIVOT_RATIO, add_normal_row, factor_semidefinite, solve_semidefinite};
 use rayon::prelude::*;
 
 /// A round that lowers the energy by less than this share ends the alternation.
@@ -133,14 +133,15 @@ impl Fit {
                 let r = sample_residual(mold, self.slope_weight, local, to_local * *n);
                 let rows = sample_mold_rows(mold, self.slope_weight, local);
                 for (row, r) in rows.iter().zip(r) {
-                    accumulate(&mut a, &mut b, row, -r);
+                    add_normal_row(&mut a, &mut b, row, -r);
                 }
             }
         }
         for (i, row) in a.iter_mut().enumerate() {
             row[i] *= 1.0 + 1e-9;
         }
-        solve_spd(&mut a, &mut b);
+        factor_semidefinite(&mut a, PIVOT_RATIO);
+        solve_semidefinite(&a, &mut b);
         let mut next = *mold;
         for (p, step) in next.parameters.iter_mut().zip(b) {
             *p += step;
@@ -194,18 +195,19 @@ impl Fit {
                 let local = to_local * (*x - pose.origin);
                 let (r, rows) = sample_pose_rows(mold, self.slope_weight, local, to_local * *n);
                 for (row, r) in rows.iter().zip(r) {
-                    accumulate(&mut a, &mut b, row, -r);
+                    add_normal_row(&mut a, &mut b, row, -r);
                 }
             }
             if let Some((r, row)) = reach(mold, to_local * (points[points.len() - 1] - pose.origin))
             {
-                accumulate(&mut a, &mut b, &row, -r);
+                add_normal_row(&mut a, &mut b, &row, -r);
             }
             let damping = REGISTRATION_DAMPING * (0..POSE).map(|i| a[i][i]).sum::<f64>() / 6.0;
             for (i, row) in a.iter_mut().enumerate() {
                 row[i] += damping;
             }
-            solve_spd(&mut a, &mut b);
+            factor_semidefinite(&mut a, PIVOT_RATIO);
+            solve_semidefinite(&a, &mut b);
             let next = moved(&pose, &b);
             let next_energy = panel_energy(mold, self.slope_weight, &next, points, normals);
             // Written so that NaN, a panel beyond the reach of a round mold, is refused.

@@ -3,7 +3,7 @@
 use crate::fit::residuals::{sample_mold_rows, sample_residual};
 use crate::layout::panels::PanelSet;
 use crate::mold::shape::{MAX_PARAMETERS, Mold, MoldType};
-use crate::small::{accumulate, factor, solve_spd};
+use numerics::{PIVOT_RATIO, add_normal_row, factor_semidefinite, solve_semidefinite};
 use rayon::prelude::*;
 use std::cmp::Reverse;
 use std::collections::{BinaryHeap, HashMap};
@@ -91,7 +91,7 @@ pub(crate) fn best_cubic(set: &PanelSet, p: usize, slope_weight: f64) -> (Featur
         let local = to_local * (*x - set.frames[p].origin);
         let r = sample_residual(&flat, slope_weight, local, to_local * *n);
         for (row, r) in sample_mold_rows(&flat, slope_weight, local).iter().zip(r) {
-            accumulate(&mut a, &mut b, row, -r);
+            add_normal_row(&mut a, &mut b, row, -r);
         }
     }
     let gram = a;
@@ -99,7 +99,8 @@ pub(crate) fn best_cubic(set: &PanelSet, p: usize, slope_weight: f64) -> (Featur
     for (i, row) in a.iter_mut().enumerate() {
         row[i] *= 1.0 + 1e-9;
     }
-    solve_spd(&mut a, &mut b);
+    factor_semidefinite(&mut a, PIVOT_RATIO);
+    solve_semidefinite(&a, &mut b);
     (b, gram)
 }
 
@@ -118,7 +119,7 @@ pub(crate) fn features(set: &PanelSet, slope_weight: f64) -> Vec<Feature> {
             }
         }
     }
-    factor(&mut metric);
+    factor_semidefinite(&mut metric, PIVOT_RATIO);
     let whiten = |c: &Feature| {
         let mut out = [0.0; 7];
         for j in 0..7 {

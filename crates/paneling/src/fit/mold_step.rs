@@ -10,7 +10,7 @@ use crate::fit::retraction::moved_on;
 use crate::fit::state::Fit;
 use crate::layout::panels::{PanelSet, Pose};
 use crate::mold::shape::{MAX_PARAMETERS, Mold};
-use crate::small::{factor, solve_factored};
+use numerics::{PIVOT_RATIO, factor_semidefinite, solve_semidefinite};
 use rayon::prelude::*;
 
 /// Tries per step; damping grows tenfold from one to the next.
@@ -79,11 +79,11 @@ fn solve(blocks: &[(Matrix, Row)], damping: f64) -> ([f64; MAX_PARAMETERS], Vec<
             for (i, row) in pose.iter_mut().enumerate() {
                 row[i] += damping * row[i] + FREE * mean;
             }
-            factor(&mut pose);
+            factor_semidefinite(&mut pose, PIVOT_RATIO);
             let mut through = [[0.0; POSE]; MAX_PARAMETERS];
             for (column, cross) in through.iter_mut().zip(&block[POSE..]) {
                 column.copy_from_slice(&cross[..POSE]);
-                solve_factored(&pose, column);
+                solve_semidefinite(&pose, column);
             }
             (pose, through)
         })
@@ -99,15 +99,15 @@ fn solve(blocks: &[(Matrix, Row)], damping: f64) -> ([f64; MAX_PARAMETERS], Vec<
             change[i] += side[POSE + i] - dot(side, &through[i]);
         }
     }
-    factor(&mut matrix);
-    solve_factored(&matrix, &mut change);
+    factor_semidefinite(&mut matrix, PIVOT_RATIO);
+    solve_semidefinite(&matrix, &mut change);
     let poses = blocks.iter().zip(&eliminated).map(|((block, side), (pose, _))| {
         let mut out = [0.0; POSE];
         out.copy_from_slice(&side[..POSE]);
         for (cross, change) in block[POSE..].iter().zip(change) {
             out.iter_mut().zip(cross).for_each(|(o, c)| *o -= c * change);
         }
-        solve_factored(pose, &mut out);
+        solve_semidefinite(pose, &mut out);
         out
     });
     (change, poses.collect())

@@ -2,4 +2,3 @@
 
 pub(crate) mod prices;
 pub(crate) mod shape;
-pub(crate) mod taylor;

@@ -1,6 +1,6 @@
 //! Mold shapes: height functions over the tangent plane of a mold's own frame.
 
-use crate::mold::taylor::Taylor;
+use numerics::Taylor;
 use serde::{Deserialize, Serialize};
 
 /// The kinds of molds, from the simplest to the most general.
@@ -180,12 +180,12 @@ impl Mold {
     fn round_at(&self, x: f64, y: f64) -> Height {
         if self.kind != MoldType::Torus {
             let [k1, k2] = self.round_curvatures().map(Taylor::constant);
-            let [x, y] = variables([x, y]);
+            let [x, y] = Taylor::variables([x, y]);
             return Height::of::<2>(round_height(x, y, k1, k2));
         }
         self.torus_height(x, y).map_or(UNREACHED, |z| {
             let [k1, k2, g, ..] = self.parameters.map(Taylor::constant);
-            let [x, y, z] = variables([x, y, z]);
+            let [x, y, z] = Taylor::variables([x, y, z]);
             Height::of(explicit::<3, 2>(z.value, torus_equation(x, y, [k1, k2, g], z)))
         })
     }
@@ -230,7 +230,7 @@ impl Mold {
             return rows;
         }
         let [k1, k2] = self.round_curvatures();
-        let [x, y, k1, k2] = variables([x, y, k1, k2]);
+        let [x, y, k1, k2] = Taylor::variables([x, y, k1, k2]);
         let z = round_height(x, y, k1, k2);
         for (row, [along_x, along_y]) in rows.iter_mut().zip([
             [z.first[2], z.first[3]],
@@ -291,14 +291,9 @@ impl Mold {
     fn torus_rows(&self, x: f64, y: f64) -> Option<Taylor<5>> {
         let z = self.torus_height(x, y)?;
         let [k1, k2, g, ..] = self.parameters;
-        let [x, y, k1, k2, g, z] = variables([x, y, k1, k2, g, z]);
+        let [x, y, k1, k2, g, z] = Taylor::variables([x, y, k1, k2, g, z]);
         Some(explicit(z.value, torus_equation(x, y, [k1, k2, g], z)))
     }
-}
-
-/// Each number as a variable of its own.
-fn variables<const N: usize>(values: [f64; N]) -> [Taylor<N>; N] {
-    std::array::from_fn(|i| Taylor::variable(values[i], i))
 }
 
 /// The height of a cylinder or sphere as a function of x, y and two curvatures, which are those
@@ -315,9 +310,9 @@ fn round_height<const N: usize>(
     k2: Taylor<N>,
 ) -> Taylor<N> {
     let one = Taylor::constant(1.0);
-    let p = k2.mul(y).mul(y).div(one.add(one.sub(k2.mul(k2).mul(y).mul(y)).sqrt()));
-    let q = p.add(p).add(k1.mul(x.mul(x).sub(p.mul(p))));
-    q.div(one.add(one.sub(k1.mul(q)).sqrt()))
+    let p = k2 * y * y / (one + (one - k2 * k2 * y * y).sqrt());
+    let q = p + p + k1 * (x * x - p * p);
+    q / (one + (one - k1 * q).sqrt())
 }
 
 /// What vanishes on the torus, see [`Mold::torus_height`].
@@ -328,14 +323,14 @@ fn torus_equation<const N: usize>(
     z: Taylor<N>,
 ) -> Taylor<N> {
     let one = Taylor::constant(1.0);
-    let below = one.sub(g.mul(y)).sub(k1.mul(z));
-    let xx = x.mul(x);
-    let w = xx.mul(k1.mul(k1).add(g.mul(g))).add(below.mul(below)).sqrt();
-    let d = Taylor::constant(0.0).sub(xx.div(below.add(w)));
-    let t = y.add(g.mul(d));
-    let tube = k2.mul(t);
-    let p = tube.mul(t).div(one.add(one.sub(tube.mul(tube)).sqrt()));
-    z.add(k1.mul(d)).sub(p)
+    let below = one - g * y - k1 * z;
+    let xx = x * x;
+    let w = (xx * (k1 * k1 + g * g) + below * below).sqrt();
+    let d = Taylor::constant(0.0) - xx / (below + w);
+    let t = y + g * d;
+    let tube = k2 * t;
+    let p = tube * t / (one + (one - tube * tube).sqrt());
+    z + k1 * d - p
 }
 
 /// The last variable of an equation, of value `z`, as a function of the `M = N − 1` others, by

@@ -9,7 +9,7 @@ use crate::fit::residuals::{POSE, SIDE, seam_side};
 use crate::fit::state::Fit;
 use crate::layout::panels::{PanelSet, SEAM_SAMPLES};
 use crate::mold::shape::MAX_PARAMETERS;
-use crate::small::{factor, solve_factored};
+use numerics::{PIVOT_RATIO, factor_semidefinite, solve_semidefinite};
 use rayon::prelude::*;
 
 /// Rows of a seam: a gap and two components of the kink per sample.
@@ -282,10 +282,10 @@ impl Arrows {
                     pose[i].copy_from_slice(&block[i][..POSE]);
                 }
                 damp(pose, d, damping[label]);
-                factor(pose);
+                factor_semidefinite(pose, PIVOT_RATIO);
                 for (i, column) in through.iter_mut().enumerate() {
                     column.copy_from_slice(&block[POSE + i][..POSE]);
-                    solve_factored(pose, column);
+                    solve_semidefinite(pose, column);
                 }
             });
         for (p, block) in blocks.iter().enumerate() {
@@ -297,7 +297,7 @@ impl Arrows {
                 }
             }
         }
-        molds.iter_mut().for_each(factor);
+        molds.iter_mut().for_each(|mold| factor_semidefinite(mold, PIVOT_RATIO));
         Self { diagonal, poses, through, molds }
     }
 
@@ -322,7 +322,7 @@ impl Arrows {
                 *z -= column.iter().zip(r).map(|(a, b)| a * b).sum::<f64>();
             }
         }
-        z.molds.iter_mut().zip(&self.molds).for_each(|(z, l)| solve_factored(l, z));
+        z.molds.iter_mut().zip(&self.molds).for_each(|(z, l)| solve_semidefinite(l, z));
         let molds = &z.molds;
         z.poses
             .par_iter_mut()
@@ -333,7 +333,7 @@ impl Arrows {
             .with_min_len(64)
             .for_each(|((((z, r), pose), through), &label)| {
                 *z = *r;
-                solve_factored(pose, z);
+                solve_semidefinite(pose, z);
                 for (column, change) in through.iter().zip(&molds[label]) {
                     z.iter_mut().zip(column).for_each(|(z, c)| *z -= c * change);
                 }

@@ -3,13 +3,13 @@
 use std::sync::Arc;
 
 use gp_solver::{Elements, ResidualBlock};
+use numerics::{Lanes, Triple};
 use pulp::Simd;
 
 use super::rows::{RowValues, SampleTerm, fill};
 use crate::field::{Sample, determinants_into};
 use crate::grid::SampleGrid;
 use crate::kernel::{THIRD, alignment, curvature_jet};
-use crate::real::{Lanes, Triple};
 use crate::sampled::SampledSurface;
 use crate::sweep::{LaneKernel, Scratch, load, store};
 

@@ -3,9 +3,9 @@
 use bspline::{BsplineCurve, Degree, KnotVector};
 use glam::{DMat3, DVec3};
 use gp_solver::{Elements, ResidualBlock};
+use numerics::lu_solve;
 
 use super::net::Net;
-use crate::dense;
 
 /// Interpolating cubics are searched for foot points from this many starts per segment.
 const STARTS: usize = 8;
@@ -157,7 +157,7 @@ fn interpolate(points: &[DVec3], closed: bool) -> Option<BsplineCurve> {
         }
         values.extend(point.to_array());
     }
-    if !dense::solve(&mut matrix, &mut values, n) {
+    if !lu_solve(&mut matrix, &mut values, n) {
         return None;
     }
     let control = values.chunks_exact(3).map(DVec3::from_slice).collect();

@@ -3,6 +3,7 @@
 use std::sync::Arc;
 
 use gp_solver::{Elements, ResidualBlock};
+use numerics::{Lanes, Triple};
 use pulp::Simd;
 
 use super::alignment::{SCALE_FLOOR, padded, store_gradient};
@@ -10,7 +11,6 @@ use super::rows::{RowValues, SampleTerm, fill};
 use crate::field::parallel_gradients;
 use crate::grid::SampleGrid;
 use crate::kernel::{FOURTH, Field, parallel, parallel_jet};
-use crate::real::{Lanes, Triple};
 use crate::sampled::SampledSurface;
 use crate::sweep::{LaneKernel, Scratch, load, store};
 

@@ -3,6 +3,7 @@
 use std::sync::Arc;
 
 use gp_solver::{Elements, ResidualBlock};
+use numerics::{Lanes, Real, Triple};
 use pulp::Simd;
 
 use super::alignment::store_gradient;
@@ -10,7 +11,6 @@ use super::rows::{RowValues, SampleTerm, fill};
 use crate::field::{Sample, samples};
 use crate::grid::SampleGrid;
 use crate::kernel::{SECOND, curvature, second};
-use crate::real::{Lanes, Real, Triple};
 use crate::relation::Relation;
 use crate::sampled::SampledSurface;
 use crate::sweep::{LaneKernel, Scratch, load, store};
@@ -79,7 +79,7 @@ impl LaneKernel<SECOND> for Affine<'_> {
         let (alpha, beta) = (load(simd, alpha, at), load(simd, beta, at));
         let gamma = load(simd, gamma, at);
         let c = curvature(&second(d));
-        store(self.values.residual, at, alpha.mul_add(c.h, beta.mul_add(c.k, gamma)));
+        store(self.values.residual, at, alpha.fma(c.h, beta.fma(c.k, gamma)));
         if !self.values.gradient.is_empty() {
             put(self.values.gradient, self.stride, at, &c, alpha, beta);
         }
@@ -100,13 +100,13 @@ impl LaneKernel<SECOND> for Ratio<'_> {
     fn run<S: Simd>(&mut self, _: S, at: usize, d: &[Triple<Lanes<S>>; SECOND]) {
         let c = curvature(&second(d));
         let smoothing = c.h.constant(self.smoothing);
-        let root = (c.h.mul_add(c.h, smoothing * smoothing) - c.k).sqrt();
+        let root = (c.h.fma(c.h, smoothing * smoothing) - c.k).sqrt();
         let (minus, plus) = (self.scale * (1.0 - self.ratio), self.scale * (1.0 + self.ratio));
-        store(self.values.residual, at, c.h.scale(minus) + root.scale(plus));
+        store(self.values.residual, at, c.h * minus + root * plus);
         if !self.values.gradient.is_empty() {
-            let by_root = root.recip().scale(plus);
-            let alpha = by_root.mul_add(c.h, c.h.constant(minus));
-            put(self.values.gradient, self.stride, at, &c, alpha, -by_root.scale(0.5));
+            let by_root = root.recip() * plus;
+            let alpha = by_root.fma(c.h, c.h.constant(minus));
+            put(self.values.gradient, self.stride, at, &c, alpha, -by_root * 0.5);
         }
     }
 }
@@ -122,7 +122,7 @@ fn put<S: Simd>(
     beta: Lanes<S>,
 ) {
     let zero = c.h.constant(0.0);
-    let mut gradient = [Triple { x: zero, y: zero, z: zero }; SECOND];
+    let mut gradient = [Triple::splat(zero); SECOND];
     for (i, slot) in gradient[1..].iter_mut().enumerate() {
         *slot = c.grad_h[i].scale(alpha).plus(beta, c.grad_k[i]);
     }

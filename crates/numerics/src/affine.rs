@@ -1,6 +1,10 @@
 //! Linear systems of any rank: one solution and the null space.
+//!
+//! Keeps its reflectors to apply `Q` later, which the factorisations of [`crate::least_squares`]
+//! and [`crate::householder`] have no use for.
 
-use super::{Matrix, axpy, dot, norm};
+use crate::matrix::Matrix;
+use crate::vector::{axpy, dot, norm};
 
 /// All solutions of `C x = b`: one of least length and an orthonormal basis of the null space.
 #[derive(Clone, Debug)]
@@ -23,7 +27,7 @@ pub struct AffineSpace {
 ///
 /// # Example
 /// ```
-/// use geom_core::linalg::{Matrix, affine_space};
+/// use numerics::{Matrix, affine_space};
 /// let mut plane = Matrix::zeros(1, 3);
 /// plane.row_mut(0).copy_from_slice(&[1.0, 1.0, 1.0]);
 /// let space = affine_space(&plane, &[3.0], &[1.0; 3], 1e-12);

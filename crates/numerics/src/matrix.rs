@@ -2,9 +2,19 @@
 
 use std::ops::{Index, IndexMut};
 
-use super::{axpy, dot};
+use crate::vector::{axpy, dot};
 
 /// A dense row-major matrix.
+///
+/// # Example
+/// ```
+/// use numerics::Matrix;
+/// let mut turn = Matrix::zeros(2, 2);
+/// turn[(0, 1)] = -1.0;
+/// turn[(1, 0)] = 1.0;
+/// assert_eq!(turn.apply(&[2.0, 3.0]), [-3.0, 2.0]);
+/// assert_eq!(turn.transpose_product(&turn), Matrix::identity(2));
+/// ```
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Matrix {
     rows: usize,

@@ -1,27 +1,25 @@
-//! Dense matrices of a few rows.
+//! Singular value decomposition and symmetric eigenvectors by Jacobi rotations.
 
-/// Determinant of a 4 × 4 matrix.
-pub(crate) fn determinant4(m: [[f64; 4]; 4]) -> f64 {
-    let glam = glam::DMat4::from_cols_array_2d(&m);
-    glam.determinant()
-}
-
-/// Inverse of a 4 × 4 matrix, `None` if it is singular to rounding.
-pub(crate) fn inverse4(m: [[f64; 4]; 4]) -> Option<[[f64; 4]; 4]> {
-    let inverse = glam::DMat4::from_cols_array_2d(&m).inverse();
-    inverse.is_finite().then(|| inverse.to_cols_array_2d())
-}
+use crate::vector::dot;
 
 /// Right singular vectors of a matrix by one-sided Jacobi rotations: singular values in falling
 /// order, each with its unit vector. Small ones come out with their full relative accuracy,
 /// unlike those from `AᵀA`.
-pub(crate) fn right_singular_vectors(rows: &[Vec<f64>]) -> Vec<(f64, Vec<f64>)> {
+///
+/// # Example
+/// ```
+/// // The second column is twice the first: (2, −1)/√5 is in the null space.
+/// let all = numerics::right_singular_vectors(&[vec![1.0, 2.0], vec![3.0, 6.0]]);
+/// assert!(all[1].0 < 1e-15);
+/// assert!((all[1].1[0] + 2.0 * all[1].1[1]).abs() < 1e-15);
+/// ```
+#[must_use]
+pub fn right_singular_vectors(rows: &[Vec<f64>]) -> Vec<(f64, Vec<f64>)> {
     let n = rows.first().map_or(0, Vec::len);
     let mut columns: Vec<Vec<f64>> =
         (0..n).map(|j| rows.iter().map(|row| row[j]).collect()).collect();
     let mut vectors: Vec<Vec<f64>> =
         (0..n).map(|j| (0..n).map(|i| f64::from(u8::from(i == j))).collect()).collect();
-    let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(x, y)| x * y).sum::<f64>();
     for _ in 0..60 {
         let mut turned = false;
         for p in 0..n {
@@ -54,6 +52,46 @@ pub(crate) fn right_singular_vectors(rows: &[Vec<f64>]) -> Vec<(f64, Vec<f64>)> 
     all
 }
 
+/// Unit eigenvector of the smallest eigenvalue of a symmetric matrix, by two-sided Jacobi
+/// rotations.
+///
+/// # Example
+/// ```
+/// // Eigenvalues 1, 3 and 5.
+/// let v = numerics::smallest_eigenvector([[2.0, 1.0, 0.0], [1.0, 2.0, 0.0], [0.0, 0.0, 5.0]]);
+/// assert!((v[0] + v[1]).abs() < 1e-15 && v[2] == 0.0);
+/// ```
+#[must_use]
+pub fn smallest_eigenvector(mut a: [[f64; 3]; 3]) -> [f64; 3] {
+    let mut vectors = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
+    for _ in 0..30 {
+        let off = a[0][1].abs() + a[0][2].abs() + a[1][2].abs();
+        if off <= 1e-300 {
+            break;
+        }
+        for (p, q) in [(0, 1), (0, 2), (1, 2)] {
+            if a[p][q] == 0.0 {
+                continue;
+            }
+            let theta = (a[q][q] - a[p][p]) / (2.0 * a[p][q]);
+            let t = theta.signum() / (theta.abs() + (theta * theta + 1.0).sqrt());
+            let c = 1.0 / (t * t + 1.0).sqrt();
+            let s = t * c;
+            for k in 0..3 {
+                (a[k][p], a[k][q]) = (c * a[k][p] - s * a[k][q], s * a[k][p] + c * a[k][q]);
+            }
+            for k in 0..3 {
+                (a[p][k], a[q][k]) = (c * a[p][k] - s * a[q][k], s * a[p][k] + c * a[q][k]);
+            }
+            let (v, w) = (vectors[p], vectors[q]);
+            vectors[p] = std::array::from_fn(|k| v[k] * c - w[k] * s);
+            vectors[q] = std::array::from_fn(|k| v[k] * s + w[k] * c);
+        }
+    }
+    let smallest = (0..3).min_by(|&i, &j| a[i][i].total_cmp(&a[j][j])).unwrap_or(0);
+    vectors[smallest]
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -71,24 +109,5 @@ mod tests {
         assert!(all[2].0 < 1e-15 * all[0].0);
         let v = &all[2].1;
         assert!((v[0] - v[1]).abs() < 1e-14 && (v[0] + v[2]).abs() < 1e-14);
-    }
-
-    #[test]
-    fn inverse_and_determinant() {
-        let m = [
-            [2.0, 0.0, 0.0, 1.0],
-            [0.0, 1.0, 0.0, 0.0],
-            [0.0, 0.0, 3.0, 0.0],
-            [1.0, 0.0, 0.0, 1.0],
-        ];
-        assert!((determinant4(m) - 3.0).abs() < 1e-14);
-        let i = inverse4(m).unwrap();
-        for a in 0..4 {
-            for b in 0..4 {
-                let sum: f64 = (0..4).map(|k| m[a][k] * i[k][b]).sum();
-                assert!((sum - f64::from(u8::from(a == b))).abs() < 1e-14);
-            }
-        }
-        assert!(inverse4([[0.0; 4]; 4]).is_none());
     }
 }

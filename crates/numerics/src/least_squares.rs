@@ -1,4 +1,8 @@
-//! Dense linear least squares by Householder reflections that leave known zeros alone.
+//! Dense linear least squares by Householder reflections.
+//!
+//! [`least_squares`] leaves known zeros alone and works column by column; [`householder`] reflects
+//! whole rows at a time, which is faster on full matrices of hundreds of columns. Their sums run
+//! in different orders, and callers compare bits, so both stay.
 
 /// Columns whose remainder falls below this share of their length depend on the columns before.
 pub const RANK_RATIO: f64 = 1e-12;
@@ -30,10 +34,10 @@ pub struct RankError {
 /// // The line through (0, 1), (1, 3), (2, 5).
 /// let mut a = [1.0, 0.0, 1.0, 1.0, 1.0, 2.0];
 /// let mut b = [1.0, 3.0, 5.0];
-/// geom_core::least_squares(&mut a, 2, &mut b, 1)?;
-/// geom_core::assert_close(b[0], 1.0, 1e-14);
-/// geom_core::assert_close(b[1], 2.0, 1e-14);
-/// # Ok::<(), geom_core::RankError>(())
+/// numerics::least_squares(&mut a, 2, &mut b, 1)?;
+/// numerics::assert_close(b[0], 1.0, 1e-14);
+/// numerics::assert_close(b[1], 2.0, 1e-14);
+/// # Ok::<(), numerics::RankError>(())
 /// ```
 pub fn least_squares(
     a: &mut [f64],
@@ -102,6 +106,78 @@ pub fn least_squares(
         }
     }
     Ok(())
+}
+
+/// Householder QR of the first `pivots` columns of a row-major matrix of full rows, applied to
+/// all of them in place. The triangle ends up in the first rows; below it stand remainders of the
+/// reflections.
+///
+/// # Example
+/// ```
+/// // Both columns lie in one direction: the second row of the triangle vanishes.
+/// let mut matrix = [3.0, 6.0, 4.0, 8.0];
+/// numerics::householder(&mut matrix, 2, 1);
+/// assert_eq!([matrix[0], matrix[1]], [-5.0, -10.0]);
+/// assert!(matrix[3].abs() < 1e-15);
+/// ```
+pub fn householder(matrix: &mut [f64], width: usize, pivots: usize) {
+    let rows = matrix.len() / width;
+    let mut reflector = vec![0.0; rows];
+    let mut products = vec![0.0; width];
+    for k in 0..pivots {
+        let mut norm = 0.0;
+        for i in k..rows {
+            reflector[i] = matrix[i * width + k];
+            norm += reflector[i] * reflector[i];
+        }
+        let alpha = -reflector[k].signum() * norm.sqrt();
+        reflector[k] -= alpha;
+        let length = norm - matrix[k * width + k].powi(2) + reflector[k].powi(2);
+        if length == 0.0 {
+            continue;
+        }
+        products[k..].fill(0.0);
+        for i in k..rows {
+            let row = &matrix[i * width..(i + 1) * width];
+            for j in k..width {
+                products[j] += reflector[i] * row[j];
+            }
+        }
+        for i in k..rows {
+            let factor = 2.0 * reflector[i] / length;
+            let row = &mut matrix[i * width..(i + 1) * width];
+            for j in k..width {
+                row[j] -= factor * products[j];
+            }
+        }
+    }
+}
+
+/// The first `unknowns` columns' coefficients that minimise the squares of the rows, as linear
+/// functions of the coefficients of the other columns: `unknowns × (width − unknowns)`, row-major.
+/// Overwrites the rows.
+///
+/// # Example
+/// ```
+/// // Rows x − p and x − q: the best x is the mean of p and q.
+/// let map = numerics::minimizers(&mut [1.0, -1.0, 0.0, 1.0, 0.0, -1.0], 3, 1);
+/// assert!((map[0] - 0.5).abs() < 1e-15 && (map[1] - 0.5).abs() < 1e-15);
+/// ```
+#[must_use]
+pub fn minimizers(rows: &mut [f64], width: usize, unknowns: usize) -> Vec<f64> {
+    householder(rows, width, unknowns);
+    let others = width - unknowns;
+    let mut out = vec![0.0; unknowns * others];
+    for i in (0..unknowns).rev() {
+        for c in 0..others {
+            let mut value = -rows[i * width + unknowns + c];
+            for k in i + 1..unknowns {
+                value -= rows[i * width + k] * out[k * others + c];
+            }
+            out[i * others + c] = value / rows[i * width + i];
+        }
+    }
+    out
 }
 
 #[cfg(test)]

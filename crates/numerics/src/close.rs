@@ -7,7 +7,7 @@
 ///
 /// # Example
 /// ```
-/// geom_core::assert_close(1e6 + 1e-7, 1e6, 1e-12);
+/// numerics::assert_close(1e6 + 1e-7, 1e6, 1e-12);
 /// ```
 #[track_caller]
 pub fn assert_close(got: f64, want: f64, bound: f64) {
