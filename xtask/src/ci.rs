@@ -3,7 +3,7 @@
 use crate::shell::{Outcome, cargo, check, is_installed, root};
 use crate::{regress, tidy};
 use std::io::{BufRead, BufReader};
-use std::process::Stdio;
+use std::process::{Command, Stdio};
 use std::time::Instant;
 
 /// Runs every check in turn, stops at the first that fails, and ends with the list of what was skipped.
@@ -19,6 +19,7 @@ pub(crate) fn run() -> Outcome {
         docs.env("RUSTDOCFLAGS", "-D warnings");
         check(docs)
     })?;
+    step("weingarten for the web", || wasm(&mut skipped))?;
     step("tidy", tidy::run)?;
     step("regress", || {
         skipped.extend(regress::run(&[])?);
@@ -45,6 +46,18 @@ fn step(name: &str, work: impl FnOnce() -> Outcome) -> Outcome {
     work().map_err(|message| format!("{name}: {message}"))?;
     println!("== {name}: passed in {:.0} s", start.elapsed().as_secs_f64());
     Ok(())
+}
+
+/// Builds the crate that runs in a page for WebAssembly, where that target can be had.
+fn wasm(skipped: &mut Vec<String>) -> Outcome {
+    const TARGET: &str = "wasm32-unknown-unknown";
+    let added = Command::new("rustup").current_dir(root()).args(["target", "add", TARGET]).output();
+    if !added.is_ok_and(|output| output.status.success()) {
+        skipped.push(format!("weingarten for the web: rustup cannot add the target {TARGET}"));
+        return Ok(());
+    }
+    let build = ["build", "--quiet", "-p", "weingarten", "--no-default-features"];
+    check(cargo(&[&build[..], &["--target", TARGET]].concat()))
 }
 
 /// Runs all tests, passes on what matters of their output, and collects the names of skipped ones.

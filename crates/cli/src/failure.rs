@@ -27,11 +27,6 @@ impl Failure {
         Self { code: USAGE, message: format!("{}: {error}", file.display()) }
     }
 
-    /// As [`input`](Self::input), what is said of the options `O` said of their flags.
-    pub(crate) fn options<O: gp_solver::Fields>(file: &Path, error: impl fmt::Display) -> Self {
-        Self::input(file, crate::option_flags::in_flags::<O>(&error.to_string()))
-    }
-
     /// Flags that cannot be honoured.
     pub(crate) fn usage(message: impl fmt::Display) -> Self {
         Self { code: USAGE, message: message.to_string() }

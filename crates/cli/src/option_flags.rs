@@ -54,11 +54,12 @@ pub(crate) fn list<O: Fields>(report: &mut Report, options: &O, but: &[&str]) {
     }
 }
 
-/// What a library says of fields in backticks, said of flags.
-pub(crate) fn in_flags<O: Fields>(message: &str) -> String {
-    O::FIELDS.iter().fold(message.to_owned(), |text, field| {
+/// What a library says of `file`; fields in backticks become flags.
+pub(crate) fn refused<O: Fields>(file: &Path, error: impl fmt::Display) -> Failure {
+    let message = O::FIELDS.iter().fold(error.to_string(), |text, field| {
         text.replace(&format!("`{}`", field.name), &flag(field.name))
-    })
+    });
+    Failure::input(file, message)
 }
 
 /// A value with the file it names put in its place: the control points of `relation curve=FILE`.

@@ -1,40 +1,54 @@
-//! Sparse nonlinear least squares and the other optimisers the methods of the workspace stand on.
+//! Quadratic constraints as sparse Jacobian triplets, and a regularised least-squares step by
+//! Cholesky: everything else in this crate follows from there.
 //!
-//! A [`Problem`] is a vector of unknowns and blocks: [`ResidualBlock`]s (rows that share their
-//! unknowns come as [`Elements`]; [`Closeness`] is ready made), [`EnergyBlock`]s, and
-//! [`QuadraticConstraints`] from coefficient triplets. [`solve`] minimises it by Levenberg-Marquardt or undamped guided projection
-//! ([`Options`]); the [`Report`] names the energy of every term at every iteration. Patterns,
-//! ordering and scatter are planned once per topology; the normal equations go to
-//! [`BandCholesky`] or [`SparseCholesky`], whichever the structure makes cheaper. Results do not
-//! depend on the number of threads, bit for bit.
-//!
-//! Besides: [`lbfgs`] with a [`Metric`], [`DenseQp`],
-//! [`MinNormProjection`] onto constraints, and [`check_jacobian`] for a block of one's own.
-//!
-//! # Example
-//! A circle through noisy points, each of which is one quadratic equation
-//! `(p − a)² + (q − b)² = r²` in the unknowns `a, b, r`:
+//! The circle through noisy points, each of which is one equation `(p − a)² + (q − b)² = r²` in the
+//! unknowns `a, b, r`, given by its coefficients:
 //! ```
-//! use gp_solver::{Options, Problem, QuadraticBuilder, Status, solve};
+//! use gp_solver::{Factorization, Options, Problem, QuadraticConstraints, System, solve};
 //!
-//! let mut circle = QuadraticBuilder::new("circle");
-//! for k in 0..20 {
-//!     let angle = 0.3 * f64::from(k);
-//!     let noise = 1e-3 * (7.0 * angle).sin();
-//!     let (p, q) = (2.0 + (3.0 + noise) * angle.cos(), 1.0 + (3.0 + noise) * angle.sin());
-//!     let row = circle.equation(1.0);
-//!     row.product(0, 0, 1.0).product(1, 1, 1.0).product(2, 2, -1.0);
-//!     row.linear(0, -2.0 * p).linear(1, -2.0 * q).constant(p * p + q * q);
+//! let (mut quadratic, mut linear, mut constants) = (Vec::new(), Vec::new(), Vec::new());
+//! for e in 0..20 {
+//!     let angle = 0.3 * e as f64;
+//!     let radius = 3.0 + 1e-3 * (7.0 * angle).sin();
+//!     let (p, q) = (2.0 + radius * angle.cos(), 1.0 + radius * angle.sin());
+//!     quadratic.extend([(e, 0, 0, 2.0), (e, 1, 1, 2.0), (e, 2, 2, -2.0)]);
+//!     linear.extend([(e, 0, -2.0 * p), (e, 1, -2.0 * q)]);
+//!     constants.push(p * p + q * q);
 //! }
-//! let mut problem = Problem::new(3);
-//! problem.add(circle.build());
+//! let circle = QuadraticConstraints::from_triplets("circle", &quadratic, &linear, &constants);
+//!
+//! // One step: (JᵀJ + ε² I) s = −Jᵀr, planned once and then repeated as often as wanted.
 //! let mut x = [0.0, 0.0, 1.0];
-//! let report = solve(problem, &mut x, &Options::default())?;
-//! assert_eq!(report.status, Status::Converged);
+//! let mut problem = Problem::new(3);
+//! problem.add(circle.clone());
+//! let mut system = System::new(problem, Factorization::Auto)?;
+//! let before = system.linearize(&x)?;
+//! system.projection_step(1e-3)?;
+//! let mut stepped = [0.0; 3];
+//! system.stepped_into(&x, &mut stepped);
+//! assert!(system.energy_at(&stepped) < before);
+//!
+//! // Steps until nothing is left to gain.
+//! let mut problem = Problem::new(3);
+//! problem.add(circle);
+//! solve(problem, &mut x, &Options::default())?;
 //! assert!((x[0] - 2.0).abs() < 1e-3 && (x[1] - 1.0).abs() < 1e-3);
 //! assert!((x[2].abs() - 3.0).abs() < 1e-3);
 //! # Ok::<(), gp_solver::SolverError>(())
 //! ```
+//!
+//! - **Variables** have names ([`Variables`]); **blocks** turn them into energy: rows of one's own
+//!   ([`ResidualBlock`]), by dual numbers ([`DualBlock`]) or differences ([`NumericBlock`]),
+//!   energies with their own model ([`EnergyBlock`]). Both make a [`Problem`].
+//! - [`System`] is a planned problem: pattern, order, scatter and symbolic factorisation once.
+//!   Blocks are weighed, replaced and given new references without a new plan.
+//! - [`Run`] steps once at a time by Levenberg-Marquardt, guided projection or Gauss-Newton
+//!   ([`Options`]); [`solve`] does it to the end. An [`Observer`] sees every step, can stop it and
+//!   keeps its [`Checkpoint`]; a [`Report`] tells the energy of every term at every iteration.
+//! - The same family on other models: [`damped_step`] (damping per group), [`lbfgs`].
+//! - Results do not depend on the number of threads, bit for bit.
+//!
+//! Without the default feature `sparse` there is the band factorisation only, and no faer.
 
 mod block;
 mod blocks;

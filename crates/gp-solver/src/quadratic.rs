@@ -150,6 +150,63 @@ impl QuadraticBuilder {
 }
 
 impl QuadraticConstraints {
+    /// Equations `½ xᵀA_e x + b_eᵀx + c_e = 0` from triplets: `(e, i, j, A_e[i, j])`, `(e, i, b_e[i])`
+    /// and one constant per equation. `A_e` need not be symmetric; entries of one place add up.
+    ///
+    /// # Panics
+    /// If a triplet names an equation without a constant.
+    ///
+    /// ```
+    /// use gp_solver::{QuadraticConstraints, ResidualBlock};
+    /// // x² + y² = 1, in the unknowns 0 and 1.
+    /// let quadratic = [(0, 0, 0, 2.0), (0, 1, 1, 2.0)];
+    /// let circle = QuadraticConstraints::from_triplets("circle", &quadratic, &[], &[-1.0]);
+    /// let mut r = [0.0];
+    /// circle.residuals(&[3.0, 4.0], &mut r);
+    /// assert_eq!(r, [24.0]);
+    /// assert_eq!(circle.triplets(&[3.0, 4.0]), [(0, 0, 6.0), (0, 1, 8.0)]);
+    /// ```
+    #[must_use]
+    pub fn from_triplets(
+        name: impl Into<String>,
+        quadratic: &[(usize, usize, usize, f64)],
+        linear: &[(usize, usize, f64)],
+        constants: &[f64],
+    ) -> Self {
+        let mut builder = QuadraticBuilder::new(name);
+        for &c in constants {
+            builder.equation(1.0).constant(c);
+        }
+        for &(e, i, j, value) in quadratic {
+            builder.equations[e].quadratic(i, j, value);
+        }
+        for &(e, i, value) in linear {
+            builder.equations[e].linear(i, value);
+        }
+        builder.build()
+    }
+
+    /// The Jacobian at `x` as (equation, unknown, value), weights included.
+    #[must_use]
+    pub fn triplets(&self, x: &[f64]) -> Vec<(usize, usize, f64)> {
+        let (mut rows, mut values) = (vec![0.0; self.len()], vec![0.0; self.linear.len()]);
+        self.linearize(x, &mut rows, &mut values);
+        let entries = |e: usize| {
+            let columns = self.elements.columns(e).iter();
+            columns.zip(self.elements.jacobian_range(e)).map(move |(&c, k)| (e, c, k))
+        };
+        (0..self.len()).flat_map(entries).map(|(e, c, k)| (e, c, values[k])).collect()
+    }
+
+    /// The Jacobian at `x` as a sparse matrix with a column per unknown, weights included.
+    #[cfg(feature = "sparse")]
+    #[must_use]
+    pub fn jacobian(&self, x: &[f64]) -> sprs::CsMat<f64> {
+        let mut triplets = sprs::TriMat::new((self.len(), x.len()));
+        self.triplets(x).into_iter().for_each(|(e, c, value)| triplets.add_triplet(e, c, value));
+        triplets.to_csr()
+    }
+
     /// Number of equations.
     #[must_use]
     pub fn len(&self) -> usize {

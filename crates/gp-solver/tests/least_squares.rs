@@ -281,7 +281,8 @@ fn blocks_change_between_steps_without_a_new_plan() {
     run.system_mut().set_reference(c, &[8.0, 8.0, 20.0]).unwrap();
     run.system_mut().add(rows.build()).unwrap();
     settle(&mut run);
-    is(run.x()[0], run.x()[2]);
+    // Soft rows leave 1 / 1e4² of what pulls them apart.
+    assert!((run.x()[0] - run.x()[2]).abs() < 1e-6, "{:?}", run.x());
     is(run.x()[0] + run.x()[2], 2.0 * 5.3 + 1.2);
     let gone = run.system_mut().remove(a).unwrap_err();
     assert_eq!(gone, SolverError::NoSuchBlock { block: 0 });

@@ -3,16 +3,14 @@
 use std::sync::Arc;
 
 use bspline::BsplineSurface;
-use gp_solver::{Closeness, DampingRule, Extra, Options as SolverOptions, Problem, Stage};
+use gp_solver::{Closeness, Problem, Stage};
 
 use crate::blocks::{Alignment, BorderGlide, Fairness, Net, Parallel, RelationRows, Shape};
 use crate::error::Error;
 use crate::grid::SampleGrid;
 use crate::kernel::Field;
-use crate::lifted;
-use crate::options::{Border, Formulation, Options};
-use crate::sampled::{SampledSurface, regular_samples};
-use crate::schedule::{curvature_size, sample_counts};
+use crate::options::{Border, Options};
+use crate::sampled::{SampledSurface, curvature_size, regular_samples, sample_counts};
 use crate::target::Target;
 use crate::variables::{control_points, coordinates, variables};
 
@@ -21,14 +19,6 @@ use crate::variables::{control_points, coordinates, variables};
 const BORDER_WEIGHT: f64 = 100.0;
 /// Weight of the distance to the last iterate (Pellis et al. 2021, Table 1).
 pub(crate) const LAST_ITERATE_WEIGHT: f64 = 1e-3;
-/// An alignment residual of this root mean square is rounding: a surface that starts there is
-/// Weingarten already and stays where it is.
-const ROUNDING_RMS: f64 = 1e-8;
-/// Converged if the largest cosine between the residual and a column of the Jacobian is below.
-const GRADIENT_TOL: f64 = 1e-9;
-/// Converged if a step is below this share of the unknowns.
-const STEP_TOL: f64 = 1e-10;
-
 /// Everything a level is made from, on the working scale.
 pub(crate) struct Level {
     /// Knots and weights of the net; its control points are the reference, on the working scale.
@@ -38,14 +28,6 @@ pub(crate) struct Level {
     pub(crate) curvature: f64,
     /// The level's name, number and scale.
     pub(crate) stage: Stage,
-}
-
-/// A level ready to be solved.
-pub(crate) struct Prepared {
-    pub(crate) problem: Problem<'static>,
-    /// All unknowns at the start.
-    pub(crate) x: Vec<f64>,
-    pub(crate) options: SolverOptions,
 }
 
 impl Level {
@@ -81,52 +63,6 @@ impl Level {
     /// The surface with these coordinates.
     pub(crate) fn surface(&self, x: &[f64]) -> Result<BsplineSurface, Error> {
         Ok(self.reference.with_control_points(control_points(x))?)
-    }
-
-    /// Problem, start and settings of the formulation asked for, with the caller's own blocks.
-    /// Scales come from `origin`, where the level begins.
-    pub(crate) fn prepared(
-        &self,
-        options: &Options,
-        origin: &[f64],
-        extra: &mut Extra<'_, Error>,
-    ) -> Result<Prepared, Error> {
-        let mut prepared = match options.formulation {
-            Formulation::Reduced => self.reduced(options, origin)?,
-            Formulation::Lifted => self.lifted(options, origin)?,
-        };
-        let variables = prepared.problem.variables().clone();
-        extra(&self.stage, &variables, &mut prepared.problem)?;
-        Ok(prepared)
-    }
-
-    fn reduced(&self, options: &Options, origin: &[f64]) -> Result<Prepared, Error> {
-        let start = self.sampled(origin)?;
-        let rounding = ROUNDING_RMS * options.alignment_weight().max(LAST_ITERATE_WEIGHT);
-        Ok(Prepared {
-            problem: self.problem(options, &start)?,
-            x: origin.to_vec(),
-            options: SolverOptions {
-                max_iterations: options.iterations,
-                damping_rule: DampingRule::Fivefold,
-                gradient_tol: GRADIENT_TOL,
-                step_tol: STEP_TOL,
-                abs_energy_tol: 0.5 * self.grid.len() as f64 * rounding * rounding,
-                ..SolverOptions::default()
-            },
-        })
-    }
-
-    fn lifted(&self, options: &Options, origin: &[f64]) -> Result<Prepared, Error> {
-        let x = lifted::start(&self.grid, origin)?;
-        Ok(Prepared {
-            problem: lifted::problem(self, options, &x)?,
-            options: SolverOptions {
-                max_iterations: options.iterations,
-                ..SolverOptions::guided_projection(LAST_ITERATE_WEIGHT)
-            },
-            x,
-        })
     }
 
     /// The surface with these control points on the grid of the level.

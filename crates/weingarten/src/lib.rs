@@ -37,6 +37,7 @@ mod lifted;
 mod locus;
 mod metrics;
 mod options;
+mod prepare;
 mod rational;
 mod relation;
 mod sampled;

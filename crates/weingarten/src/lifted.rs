@@ -91,12 +91,6 @@ pub(crate) fn problem(
     Ok(problem)
 }
 
-/// The rows that read control points, for tests.
-#[cfg(test)]
-pub(crate) fn definitions(grid: &Arc<SampleGrid>, x: &[f64]) -> impl ResidualBlock {
-    Definitions::new(grid, x)
-}
-
 /// `Δ = E G − F²`, `K Δ = L N − M²`, `2 H Δ = L G − 2 M F + N E`.
 fn curvature_definitions(grid: &SampleGrid) -> QuadraticConstraints {
     let mut equations = QuadraticBuilder::new("curvature_definitions");
@@ -168,7 +162,7 @@ fn differences(parameters: &[f64], period: Option<f64>) -> Vec<Difference> {
 
 /// The nine rows of a sample that read its control points: `n = s_u × s_v`, `E, F, G`, and
 /// `L = ⟨s_uu, n⟩ / √Δᵏ` and so on with the determinant of the last iterate.
-struct Definitions {
+pub(crate) struct Definitions {
     grid: Arc<SampleGrid>,
     elements: Elements,
     /// `1/√Δᵏ` of every sample.
@@ -181,7 +175,7 @@ const ROWS: usize = 9;
 const COLUMNS: [usize; 9] = [N, N + 1, N + 2, E, F, G, L, M, NN];
 
 impl Definitions {
-    fn new(grid: &Arc<SampleGrid>, x: &[f64]) -> Self {
+    pub(crate) fn new(grid: &Arc<SampleGrid>, x: &[f64]) -> Self {
         let spans = grid.elements();
         let m_v = grid.v.len();
         let mut elements = Elements::new();

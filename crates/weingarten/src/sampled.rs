@@ -3,14 +3,17 @@
 use std::sync::Arc;
 
 use bspline::BsplineSurface;
-use geom_core::FirstForm;
+use geom_core::{BoundingBox, FirstForm};
 use gp_solver::Counts;
 
 use crate::error::Error;
 use crate::field::{Sample, samples};
 use crate::grid::SampleGrid;
-use crate::schedule::curvature_size;
 use crate::variables::coordinates;
+
+/// A surface whose mean absolute principal curvature times its bounding-box diagonal is below
+/// this is flat: its working scale is bounding-box diagonal = 1.
+const FLAT_RATIO: f64 = 1e-9;
 
 /// A surface sampled on a grid, each sample checked to be regular. Blocks with one row per sample
 /// are made from it: it fixes their sparsity, and their residuals are scaled to be of size one
@@ -72,4 +75,29 @@ pub(crate) fn regular_samples(grid: &SampleGrid, x: &[f64]) -> Result<Vec<Sample
         }
         None => Ok(samples),
     }
+}
+
+/// Samples in u and v: as asked for, or twice the control points.
+pub(crate) fn sample_counts(surface: &BsplineSurface, samples: Option<Counts>) -> [usize; 2] {
+    samples.map_or([2 * surface.n_u(), 2 * surface.n_v()], |s| [s.u, s.v])
+}
+
+/// Mean absolute principal curvature of samples of a surface, `None` where nothing is curved.
+pub(crate) fn curvature_size(
+    surface: &BsplineSurface,
+    samples: &[Sample],
+) -> Result<Option<f64>, Error> {
+    let mean = |s: &Sample| {
+        let (k1, k2) = s.principal();
+        0.5 * (k1.abs() + k2.abs())
+    };
+    let curvature = samples.iter().map(mean).sum::<f64>() / samples.len() as f64;
+    Ok((curvature * extent(surface)? > FLAT_RATIO).then_some(curvature))
+}
+
+/// Diagonal of the bounding box of the control points.
+pub(crate) fn extent(surface: &BsplineSurface) -> Result<f64, Error> {
+    let diagonal = BoundingBox::of(surface.control_points().iter().copied())
+        .map_or(0.0, BoundingBox::diagonal);
+    if diagonal > 0.0 { Ok(diagonal) } else { Err(Error::NoExtent) }
 }

@@ -1,23 +1,18 @@
 //! What is solved one after the other: the input refitted to each net, on one working scale.
 
 use bspline::{BsplineSurface, Degree, KnotError, KnotVector};
-use geom_core::BoundingBox;
 use glam::DVec3;
 use gp_solver::{Counts, Stage};
 
 use crate::error::Error;
-use crate::field::Sample;
 use crate::grid::SampleGrid;
 use crate::level::Level;
 use crate::options::{Move, Options};
-use crate::sampled::regular_samples;
+use crate::sampled::{curvature_size, extent, regular_samples, sample_counts};
 use crate::variables::{coordinates, scaled};
 
 /// Mean absolute principal curvature on the working scale (Pellis et al. 2021, Table 1).
 const WORKING_CURVATURE: f64 = 5.0;
-/// A surface whose mean absolute principal curvature times its bounding-box diagonal is below
-/// this is flat: its working scale is bounding-box diagonal = 1.
-const FLAT_RATIO: f64 = 1e-9;
 /// Least degree a level is refitted with: the derivatives of the curvatures are those of the
 /// third derivatives of the surface.
 const LEAST_DEGREE: usize = 3;
@@ -52,24 +47,6 @@ impl Schedule {
         let stage = Stage::new(name, number, self.len()).at([0.0; 3], self.unit);
         Level::new(reference, self.samples, stage)
     }
-}
-
-/// Samples in u and v: as asked for, or twice the control points.
-pub(crate) fn sample_counts(surface: &BsplineSurface, samples: Option<Counts>) -> [usize; 2] {
-    samples.map_or([2 * surface.n_u(), 2 * surface.n_v()], |s| [s.u, s.v])
-}
-
-/// Mean absolute principal curvature of samples of a surface, `None` where nothing is curved.
-pub(crate) fn curvature_size(
-    surface: &BsplineSurface,
-    samples: &[Sample],
-) -> Result<Option<f64>, Error> {
-    let mean = |s: &Sample| {
-        let (k1, k2) = s.principal();
-        0.5 * (k1.abs() + k2.abs())
-    };
-    let curvature = samples.iter().map(mean).sum::<f64>() / samples.len() as f64;
-    Ok((curvature * extent(surface)? > FLAT_RATIO).then_some(curvature))
 }
 
 /// The input with its control points moved as asked for.
@@ -126,11 +103,4 @@ fn working_unit(surface: &BsplineSurface, samples: Option<Counts>) -> Result<f64
     let samples = regular_samples(&grid, &coordinates(surface))?;
     let curvature = curvature_size(surface, &samples)?;
     Ok(curvature.map_or(1.0 / extent, |curvature| curvature / WORKING_CURVATURE))
-}
-
-/// Diagonal of the bounding box of the control points.
-fn extent(surface: &BsplineSurface) -> Result<f64, Error> {
-    let diagonal = BoundingBox::of(surface.control_points().iter().copied())
-        .map_or(0.0, BoundingBox::diagonal);
-    if diagonal > 0.0 { Ok(diagonal) } else { Err(Error::NoExtent) }
 }

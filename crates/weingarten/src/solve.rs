@@ -13,6 +13,7 @@ use crate::level::Level;
 use crate::locus::RelationLocus;
 use crate::metrics::{Meter, Metrics};
 use crate::options::Options;
+use crate::prepare::prepared;
 use crate::sampled::SampledSurface;
 use crate::schedule::Schedule;
 use crate::variables::{coordinates, scaled};
@@ -113,7 +114,7 @@ pub fn solve_with(
             (None, None) => coordinates(&level.reference),
             (Some((.., working)), None) => coordinates(&level.refitted(working)?),
         };
-        let solved = level.prepared(options, &origin, extra)?;
+        let solved = prepared(&level, options, &origin, extra)?;
         let system = System::new(solved.problem, solved.options.factorization)?;
         let mut run = Run::new(system, &solved.x, &solved.options)?;
         if let Some(checkpoint) = resumed {
@@ -143,7 +144,7 @@ pub fn solve_with(
 pub fn problem(surface: &BsplineSurface, options: &Options) -> Result<Problem<'static>, Error> {
     let level = Schedule::new(surface, options)?.level(0)?;
     let origin = coordinates(&level.reference);
-    Ok(level.prepared(options, &origin, &mut |_, _, _| Ok(()))?.problem)
+    Ok(prepared(&level, options, &origin, &mut |_, _, _| Ok(()))?.problem)
 }
 
 /// Back to the model's units, measured and put together.

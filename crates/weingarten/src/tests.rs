@@ -9,7 +9,7 @@ use crate::blocks::{
 };
 use crate::grid::SampleGrid;
 use crate::level::Level;
-use crate::lifted;
+use crate::lifted::{self, Definitions};
 use crate::metrics::Meter;
 use crate::variables::coordinates;
 use crate::{Options, Relation};
@@ -186,7 +186,7 @@ fn lifted_jacobians_match_central_differences_and_the_start_satisfies_the_defini
         }
         let mut off = x.clone();
         off.iter_mut().enumerate().for_each(|(k, v)| *v *= 1.0 + 0.01 * (k as f64).cos());
-        check_jacobian(&lifted::definitions(&level.grid, &off), &off, 1e-3, 1e-9);
+        check_jacobian(&Definitions::new(&level.grid, &off), &off, 1e-3, 1e-9);
     }
 }
 

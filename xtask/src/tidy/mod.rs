@@ -1,7 +1,11 @@
 //! `cargo xtask tidy`: rules that no compiler checks.
 
+mod blocks;
+mod callers;
 mod circles;
 mod dependencies;
+mod family;
+mod flags;
 mod numerics;
 mod sources;
 mod stray_words;
@@ -15,6 +19,9 @@ pub(crate) fn run() -> Outcome {
     let mut faults = Vec::new();
     dependencies::check(&mut faults)?;
     circles::check(&mut faults)?;
+    family::check(&mut faults)?;
+    blocks::check(&mut faults)?;
+    callers::check(&mut faults)?;
     let references = read(&root().join("docs/references.md"))?;
     for path in tracked_text_files()? {
         let text = read(&path)?;
@@ -22,6 +29,7 @@ pub(crate) fn run() -> Outcome {
         if path.extension().is_some_and(|e| e == "rs") {
             sources::check(&shown, &text, &references, &mut faults);
             numerics::check(&shown, &text, &mut faults);
+            flags::check(&shown, &text, &mut faults);
         }
         stray_words::check(&shown, &text, &mut faults);
     }

@@ -3,6 +3,15 @@
 
 /// Names, `::` and single marks of `text` in order; comments, literals and lifetimes are left out.
 pub(crate) fn tokens(text: &str) -> Vec<&str> {
+    scan(text, false)
+}
+
+/// As [`tokens`], with the string literals in their places.
+pub(crate) fn tokens_and_texts(text: &str) -> Vec<&str> {
+    scan(text, true)
+}
+
+fn scan(text: &str, with_texts: bool) -> Vec<&str> {
     let mut out = Vec::new();
     let mut rest = text;
     while let Some(first) = rest.chars().next() {
@@ -11,9 +20,12 @@ pub(crate) fn tokens(text: &str) -> Vec<&str> {
         } else if rest.starts_with("/*") {
             block_comment(rest)
         } else if let Some(length) = raw_string(rest) {
+            out.extend(with_texts.then_some(&rest[..length]));
             length
         } else if first == '"' {
-            quoted(rest, '"')
+            let length = quoted(rest, '"');
+            out.extend(with_texts.then_some(&rest[..length]));
+            length
         } else if first == '\'' {
             character_or_lifetime(rest)
         } else if is_word(first) {

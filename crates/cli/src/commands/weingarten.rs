@@ -3,7 +3,7 @@
 use crate::args::{CheckpointArgs, ConfigArgs, ConvergedArgs, OutputArgs, ReportArgs, SystemArgs};
 use crate::context::Context;
 use crate::failure::Failure;
-use crate::option_flags::OptionFlags;
+use crate::option_flags::{OptionFlags, refused};
 use crate::outcome::Outcome;
 use crate::report_support;
 use crate::report_support::weingarten::weingarten_report;
@@ -51,7 +51,7 @@ impl Weingarten {
             .with_checkpoints(&self.checkpoint)?
             .with_systems(self.system.dump_system.as_deref())?;
         let solution = solve(&named.surface, &options, &mut watch)
-            .map_err(|e| Failure::options::<Options>(&self.input, e))?;
+            .map_err(|e| refused::<Options>(&self.input, e))?;
         let mut outcome = outcome(&solution, &model.unit)?.with_input(&self.input);
         watch.finish(&mut outcome)?;
         outcome.warnings = model.warnings;

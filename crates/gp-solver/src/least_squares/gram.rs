@@ -84,7 +84,7 @@ impl WithSimd for AddGram<'_> {
             let r = simd.splat_f64s(r);
             let sums = S::as_mut_simd_f64s(products).0;
             for (sum, &value) in sums.iter_mut().zip(S::as_simd_f64s(row).0) {
-                *sum = simd.mul_add_f64s(value, r, *sum);
+                *sum = simd.mul_add_e_f64s(value, r, *sum);
             }
         }
         if residuals.len() <= FEW_ROWS {
@@ -154,8 +154,8 @@ fn tile<S: Simd, const R: usize>(
         let factors = &row[b..b + 2];
         let (first, second) = (simd.splat_f64s(factors[0]), simd.splat_f64s(factors[1]));
         for r in 0..R {
-            sums[0][r] = simd.mul_add_f64s(vectors[r], first, sums[0][r]);
-            sums[1][r] = simd.mul_add_f64s(vectors[r], second, sums[1][r]);
+            sums[0][r] = simd.mul_add_e_f64s(vectors[r], first, sums[0][r]);
+            sums[1][r] = simd.mul_add_e_f64s(vectors[r], second, sums[1][r]);
         }
     }
     sums

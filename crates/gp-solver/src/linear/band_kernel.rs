@@ -110,7 +110,7 @@ fn subtract_product<S: Simd, const R: usize, const C: usize, const G: usize, con
         for c in 0..C {
             let y = simd.splat_f64s(b[C * PART + c]);
             for r in 0..R {
-                sums[c][r] = simd.mul_add_f64s(a[r], y, sums[c][r]);
+                sums[c][r] = simd.mul_add_e_f64s(a[r], y, sums[c][r]);
             }
         }
     }
@@ -297,7 +297,7 @@ fn solve_block<S: Simd, const R: usize, const G: usize>(
         for (other, &l) in rest.iter_mut().zip(&diagonal[c][c + 1..]) {
             let l = simd.splat_f64s(-l);
             for r in 0..R {
-                other[r] = simd.mul_add_f64s(l, x[r], other[r]);
+                other[r] = simd.mul_add_e_f64s(l, x[r], other[r]);
             }
         }
     }
@@ -334,7 +334,7 @@ impl ForwardGroup<'_> {
             for h in 0..2 {
                 let y = simd.splat_f64s(known[h]);
                 for r in 0..R {
-                    sums[h][r] = simd.mul_add_f64s(pair[h][r], y, sums[h][r]);
+                    sums[h][r] = simd.mul_add_e_f64s(pair[h][r], y, sums[h][r]);
                 }
             }
         }
@@ -388,7 +388,7 @@ impl BackwardGroup<'_> {
         for (column, open) in columns.iter().zip(&mut open[start * G..]) {
             let mut sum = simd.mul_f64s(column[0], own[0]);
             for r in 1..R {
-                sum = simd.mul_add_f64s(column[r], own[r], sum);
+                sum = simd.mul_add_e_f64s(column[r], own[r], sum);
             }
             *open -= simd.reduce_sum_f64s(sum);
         }
