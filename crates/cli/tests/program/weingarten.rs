@@ -181,3 +181,24 @@ fn an_output_folder_that_is_missing_is_refused_before_any_work() {
     let result = umbilic(&["weingarten", "fixtures/roof.ron", "-o", "a.xyz"]);
     assert_eq!(result.status.code(), Some(2));
 }
+
+#[test]
+fn systems_are_dumped_as_matrix_market_files() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let dir = folder.path().to_str().expect("a name");
+    let out = format!("{dir}/a.ron");
+    let args = ["weingarten", "fixtures/saddle.ron", "-o", &out, "--iterations", "1"];
+    let levels = ["--levels", "7x7,8x8", "--dump-system", dir];
+    let output = umbilic(&[&args[..], &levels[..]].concat());
+    assert!(output.status.success(), "{}", message(&output));
+    for (stage, columns) in [(0, 3 * 49), (1, 3 * 64)] {
+        let jacobian = std::fs::read_to_string(format!("{dir}/stage-{stage}-jacobian.mtx"));
+        let jacobian = jacobian.expect("a file");
+        let mut lines = jacobian.lines().skip_while(|line| line.starts_with('%'));
+        let size: Vec<usize> =
+            lines.next().unwrap_or_default().split(' ').map(|n| n.parse().unwrap()).collect();
+        assert_eq!((size[1], size[2]), (columns, lines.count()));
+        let gradient = std::fs::read_to_string(format!("{dir}/stage-{stage}-gradient.mtx"));
+        assert_eq!(gradient.expect("a file").lines().count(), columns + 2);
+    }
+}

@@ -2,7 +2,9 @@
 
 use super::system::System;
 use crate::block::Block;
-use crate::linear::{Factor, SymmetricPattern};
+use crate::linear::Factor;
+#[cfg(feature = "sparse")]
+use crate::linear::SymmetricPattern;
 
 /// A matrix as (row, column, value), each place at most once.
 pub type Triplets = Vec<(usize, usize, f64)>;
@@ -30,6 +32,7 @@ impl System<'_> {
     #[must_use]
     pub fn normal_triplets(&self) -> Triplets {
         let (n, matrix) = (self.variables(), self.matrix());
+        #[cfg(feature = "sparse")]
         let columns = |pattern: &SymmetricPattern| -> Triplets {
             let rows = pattern.rows();
             (0..n)

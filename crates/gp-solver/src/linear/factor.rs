@@ -10,8 +10,10 @@ use crate::options::Factorization;
 /// Speeds of the two factorisations (flops per second) their costs are compared with. Only the
 /// ratio matters; measured on AVX2 and AVX-512 machines.
 const BAND_SPEED: f64 = 40e9;
+#[cfg(feature = "sparse")]
 const SPARSE_SPEED: f64 = 12e9;
 /// Seconds the sparse factorisation spends per stored value of the factor besides arithmetic.
+#[cfg(feature = "sparse")]
 const SPARSE_OVERHEAD: f64 = 2e-9;
 /// A band with at least this share of structural nonzeros is taken without a look at the
 /// sparse alternative.
@@ -36,7 +38,10 @@ pub(crate) enum Factor {
 
 /// Where the values of the normal matrix stand.
 pub(crate) enum Storage<'a> {
-    Band { stride: usize },
+    Band {
+        stride: usize,
+    },
+    #[cfg_attr(not(feature = "sparse"), expect(dead_code, reason = "only bands there"))]
     Columns(&'a SymmetricPattern),
 }
 
@@ -51,6 +56,8 @@ impl Factor {
         together: Option<&[usize]>,
         wanted: Factorization,
     ) -> Result<(Self, Option<Vec<usize>>), SolverError> {
+        #[cfg(not(feature = "sparse"))]
+        let _ = together;
         #[cfg(feature = "sparse")]
         if let Some(together) = together
             && (wanted == Factorization::Dissection
@@ -136,7 +143,8 @@ impl Factor {
     pub(crate) fn half_bandwidth(&self) -> usize {
         match self {
             Self::Band(band) => band.half_bandwidth(),
-            _ => usize::MAX,
+            #[cfg(feature = "sparse")]
+            Self::Sparse { .. } | Self::Dissected { .. } => usize::MAX,
         }
     }
 
