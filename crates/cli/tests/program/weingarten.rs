@@ -1,7 +1,7 @@
 //! `umbilic weingarten` and `umbilic demo` from the outside: files, exit codes, messages.
 
 use crate::common;
-use crate::common::{root, umbilic};
+use crate::common::{message, root, umbilic};
 use std::fs;
 use std::path::Path;
 
