@@ -37,12 +37,28 @@ impl<O: Fields> OptionFlags<O> {
                 (other.reset)(&mut options);
             }
         }
-        for (field, text) in &self.given {
+        for (field, text) in self.given.iter().filter(|(field, text)| !is_file(field.name, text)) {
             (field.set)(&mut options, text)
                 .map_err(|e| Failure::usage(format!("{}: {e}", flag(field.name))))?;
         }
         Ok(options)
     }
+
+    /// The file given in place of a value, for options that take one.
+    pub(crate) fn file(&self, name: &str) -> Option<&Path> {
+        let given = self.given.iter().find(|(field, text)| {
+            field.name == name && is_file(field.name, text)
+        });
+        given.map(|(_, text)| Path::new(text))
+    }
+}
+
+/// Options that take a file of this extension in place of a value; the command reads it.
+const FILE_VALUES: [(&str, &str); 2] = [("layout", "obj"), ("symmetry", "ron")];
+
+fn is_file(name: &str, text: &str) -> bool {
+    let extension = exchange::extension_of(Path::new(text));
+    FILE_VALUES.iter().any(|(field, of)| *field == name && *of == extension)
 }
 
 /// Lists options as they are in force, but for those named, which the caller tells of itself.
@@ -54,12 +70,16 @@ pub(crate) fn list<O: Fields>(report: &mut Report, options: &O, but: &[&str]) {
     }
 }
 
-/// What a library says of `file`; fields in backticks become flags.
-pub(crate) fn refused<O: Fields>(file: &Path, error: impl fmt::Display) -> Failure {
-    let message = O::FIELDS.iter().fold(error.to_string(), |text, field| {
+/// What a library says of fields in backticks, said of flags.
+pub(crate) fn in_flags<O: Fields>(message: &str) -> String {
+    O::FIELDS.iter().fold(message.to_owned(), |text, field| {
         text.replace(&format!("`{}`", field.name), &flag(field.name))
-    });
-    Failure::input(file, message)
+    })
+}
+
+/// What a library says of `file`, in flags.
+pub(crate) fn refused<O: Fields>(file: &Path, error: impl fmt::Display) -> Failure {
+    Failure::input(file, in_flags::<O>(&error.to_string()))
 }
 
 /// A value with the file it names put in its place: the control points of `relation curve=FILE`.
@@ -83,10 +103,16 @@ fn flag(name: &str) -> String {
 
 fn arg<O: Fields>(field: &'static Field<O>, defaults: &O) -> Arg {
     let mut help = field.help();
+    if let Some((_, extension)) = FILE_VALUES.iter().find(|(name, _)| *name == field.name) {
+        help.push_str(&format!(", or the name of a file .{extension}"));
+    }
     if let Some(default) = (field.get)(defaults).filter(|_| !field.is_switch) {
         help.push_str(&format!(" [default: {default}]"));
     }
     let check = move |text: &str| -> Result<String, String> {
+        if is_file(field.name, text) {
+            return Ok(text.to_owned());
+        }
         let text = from_file(field.name, text)?;
         (field.set)(&mut O::default(), &text).map(|()| text)
     };
@@ -94,6 +120,8 @@ fn arg<O: Fields>(field: &'static Field<O>, defaults: &O) -> Arg {
         .long(field.name.replace('_', "-"))
         .help(help)
         .value_parser(ValueParser::new(check));
+    let is_rare = field.doc.iter().any(|line| line.to_lowercase().contains("rarely needed"));
+    let arg = arg.hide_short_help(is_rare);
     if field.is_switch {
         return arg.num_args(0).default_missing_value("true");
     }
