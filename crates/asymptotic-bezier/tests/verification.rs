@@ -3,7 +3,7 @@
 mod common;
 
 use asymptotic_bezier::{
-    AsymptoticNet, AsymptoticWarning, BoundaryOptions, CurveForm, Gridshell, GridshellCheck,
+    AsymptoticNet, Warning, BoundaryOptions, CurveForm, Gridshell, GridshellCheck,
     GridshellOptions, Joins, PatchCheck, PatchOptions, Place, TorsionHandle, fill_net, fill_patch,
     solve_boundary, solve_quadrilateral,
 };
@@ -33,7 +33,7 @@ fn hand_made_and_random_sets_are_warned_about() {
         let set = reference_set(name);
         let quad = solve_quadrilateral(&set.data, &BoundaryOptions::default()).unwrap();
         let turning =
-            |w: &AsymptoticWarning| matches!(w, AsymptoticWarning::BinormalTurning { .. });
+            |w: &Warning| matches!(w, Warning::BinormalTurning { .. });
         assert!(quad.warnings.iter().any(turning), "{name}");
         println!("{name} {:?}", quad.warnings);
         let options = PatchOptions { degree: Some(7), ..Default::default() };
@@ -42,7 +42,7 @@ fn hand_made_and_random_sets_are_warned_about() {
         println!("{name} energy {} {check:?}", filled.thin_plate_energy);
         let warnings = check.warnings(Place::Patch(0), 0.1);
         let crossing =
-            |w: &AsymptoticWarning| matches!(w, AsymptoticWarning::SelfIntersection { .. });
+            |w: &Warning| matches!(w, Warning::SelfIntersection { .. });
         assert!(warnings.iter().any(crossing), "{name}");
     }
 }

@@ -5,14 +5,14 @@
 mod common;
 
 use asymptotic_bezier::{
-    AsymptoticNet, AsymptoticWarning, BoundaryOptions, CornerData, Curvatures, CurveForm,
+    AsymptoticNet, Warning, BoundaryOptions, CornerData, Curvatures, CurveForm,
     DesignOptions, Input, Joins, PatchCheck, PatchOptions, Place, TorsionHandle, design,
     doubt_signs, fill_patch, solve_boundary, solve_quadrilateral, solve_quartic_quadrilateral,
 };
 use common::{Gauss, catenoid, enneper, exact_net, reference_set, sampled_net};
 use geom_core::{DVec3, PolyMesh};
 
-fn said(warnings: &[AsymptoticWarning], words: &str) -> bool {
+fn said(warnings: &[Warning], words: &str) -> bool {
     warnings.iter().any(|w| w.to_string().contains(words))
 }
 
