@@ -155,11 +155,7 @@ pub fn solve_with(
 ///
 /// # Errors
 /// As [`solve`]; [`Error::NoSuchStage`] for quartics and joins that have none.
-pub fn problem(
-    input: &Input,
-    options: &Options,
-    phase: Phase,
-) -> Result<Problem<'static>, Error> {
+pub fn problem(input: &Input, options: &Options, phase: Phase) -> Result<Problem<'static>, Error> {
     let prepared = Prepared::new(input, options)?;
     let (boundary, patch) = (&prepared.boundary, options.patch());
     let mut nobody = ();
@@ -310,9 +306,7 @@ fn mean_jump(
         return Ok(entry.numbers.first().copied());
     }
     let jump = match fill_solved(net, boundary.clone(), &options.patch(), Joins::G1, watch) {
-        Ok(shell) => {
-            Some(shell.check_joins(net).iter().map(|j| j.mean_jump).fold(0.0, f64::max))
-        }
+        Ok(shell) => Some(shell.check_joins(net).iter().map(|j| j.mean_jump).fold(0.0, f64::max)),
         Err(error @ Error::Interrupted { .. }) => return Err(error),
         // Where G1 patches fold there is nothing to compare with.
         Err(_) => None,

@@ -226,6 +226,9 @@ impl<'w, 'e> Watch<'w, 'e> {
     ) -> Result<usize, Error> {
         match self.minimize(problem, x, options) {
             Ok((_, iterations)) => Ok(iterations),
+            Err(Error::Solver(SolverError::ForeignCheckpoint { what })) => {
+                Err(SolverError::ForeignCheckpoint { what }.into())
+            }
             Err(Error::Solver(_)) if !self.is_extended() => {
                 self.record(Entry { numbers: x.to_vec(), counts: vec![0, 0] });
                 Ok(0)

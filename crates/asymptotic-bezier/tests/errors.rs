@@ -4,9 +4,8 @@
 mod common;
 
 use asymptotic_bezier::{
-    Error, AsymptoticNet, Warning, BoundaryOptions, CornerData, Curvatures,
-    CurveForm, DataFile, NetCurve, PatchOptions, Place, TorsionHandle, fill_patch, solve_boundary,
-    solve_quadrilateral,
+    AsymptoticNet, BoundaryOptions, CornerData, Curvatures, CurveForm, DataFile, Error, NetCurve,
+    PatchOptions, Place, TorsionHandle, Warning, fill_patch, solve_boundary, solve_quadrilateral,
 };
 use common::{reference_set, reference_sets};
 use geom_core::DVec3;

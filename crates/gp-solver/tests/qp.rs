@@ -159,7 +159,8 @@ fn bounded_programs_have_the_same_minimum_or_none() {
         for i in 0..n {
             let (a, b) = (0.2 * random.next(), 0.2 * random.next());
             // Every tenth program has bounds that cross.
-            let (low, high) = if seed % 10 == 9 && i == 0 { (0.3, 0.1) } else { (a.min(b), a.max(b)) };
+            let (low, high) =
+                if seed % 10 == 9 && i == 0 { (0.3, 0.1) } else { (a.min(b), a.max(b)) };
             program.least.push((unit(i, 1.0), low));
             program.least.push((unit(i, -1.0), -high));
             qp.bounds(i, low, high);

@@ -264,10 +264,7 @@ pub(crate) fn finish(
     let positive = (0..4).any(|c| known(c) && torsions[c] > 0.0);
     let negative = (0..4).any(|c| known(c) && torsions[c] < 0.0);
     if positive && negative {
-        warnings.push(Warning::CornerTorsionSigns {
-            place: Place::Patch(0),
-            values: torsions,
-        });
+        warnings.push(Warning::CornerTorsionSigns { place: Place::Patch(0), values: torsions });
     }
     Ok(Quadrilateral {
         strain_energy: curves.iter().map(|c| c.derivative_energy(2)).sum(),

@@ -53,10 +53,7 @@ struct CondensedCurve {
 ///
 /// # Errors
 /// Every hard fault of the data (see [`Error`]).
-pub fn solve_boundary(
-    net: &AsymptoticNet,
-    options: &BoundaryOptions,
-) -> Result<Boundary, Error> {
+pub fn solve_boundary(net: &AsymptoticNet, options: &BoundaryOptions) -> Result<Boundary, Error> {
     boundary_of(net, options, &mut Watch::quiet(&mut ()))
 }
 
@@ -296,11 +293,9 @@ fn inflected(
             let curve = BezierCurve::from_offsets(found.curve.offsets().to_vec(), ends);
             Ok((curve.elevated(degree), found.parameters))
         }
-        Err((defect, iterations)) => Err(Error::InflectionNotFound {
-            place: net.curve_place(i),
-            defect,
-            iterations,
-        }),
+        Err((defect, iterations)) => {
+            Err(Error::InflectionNotFound { place: net.curve_place(i), defect, iterations })
+        }
     }
 }
 

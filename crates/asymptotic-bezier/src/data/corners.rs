@@ -252,10 +252,7 @@ impl AsymptoticNet {
     pub fn check(&self) -> Result<(), Error> {
         for (v, p) in self.positions.iter().enumerate() {
             if !p.is_finite() {
-                return Err(Error::NotFinite {
-                    place: self.vertex_place(v),
-                    what: "the position",
-                });
+                return Err(Error::NotFinite { place: self.vertex_place(v), what: "the position" });
             }
         }
         for (i, curve) in self.curves.iter().enumerate() {

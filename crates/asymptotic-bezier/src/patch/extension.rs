@@ -20,7 +20,12 @@ pub(crate) struct Points {
 impl Points {
     /// `freedoms` are the numbers of the family's own, `inner` that of the first inner coordinate
     /// (axis by axis); `shift` is where the family's origin lies.
-    pub(crate) fn new(family: &PatchFamily, freedoms: &[usize], inner: usize, shift: DVec3) -> Self {
+    pub(crate) fn new(
+        family: &PatchFamily,
+        freedoms: &[usize],
+        inner: usize,
+        shift: DVec3,
+    ) -> Self {
         let n = family.degree;
         let table = fill_table(n);
         let len = 3 * (n + 1) * (n + 1);
@@ -49,7 +54,11 @@ impl Points {
 
 /// The equations that tie the second rings of patches to their tangent fields, which keeps the
 /// boundary asymptotic: `Q − Σ slope · field = constant`.
-pub(crate) fn tangent_planes(maps: &[Points], fields: Group, points: Group) -> QuadraticConstraints {
+pub(crate) fn tangent_planes(
+    maps: &[Points],
+    fields: Group,
+    points: Group,
+) -> QuadraticConstraints {
     let mut equations = QuadraticBuilder::new("tangent planes");
     let mut first = 0;
     for map in maps {

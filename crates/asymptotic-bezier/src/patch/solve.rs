@@ -6,8 +6,6 @@ use gp_solver::{BlockId, Group, Problem, QuadraticForm, Status, Variables};
 
 use crate::boundary::four_curves::PatchBoundary;
 use crate::error::{Error, Place};
-use crate::warning::Warning;
-use crate::watch::{Shape, Watch};
 use crate::patch::bounds;
 use crate::patch::extension::{Points, held_equations, tangent_planes};
 use crate::patch::family::PatchFamily;
@@ -17,6 +15,8 @@ use crate::patch::plate_block::ThinPlate;
 use crate::patch::surface::Patch;
 use crate::patch::thin_plate::{MAX_SURFACE_DEGREE, fill_table};
 use crate::stages::{CONTROL_POINTS, FIELDS};
+use crate::warning::Warning;
+use crate::watch::{Shape, Watch};
 
 /// A filled patch.
 #[derive(Clone, Debug, PartialEq)]
@@ -117,11 +117,7 @@ fn fill_by(
         match fill(n) {
             Ok(mut filled) => {
                 if n != first {
-                    filled.warnings.push(Warning::DegreeRaised {
-                        place,
-                        from: first,
-                        to: n,
-                    });
+                    filled.warnings.push(Warning::DegreeRaised { place, from: first, to: n });
                 }
                 if tried.len() == 1 || filled.patch.least_sine(16) >= options.min_sine {
                     return Ok(filled);
@@ -135,9 +131,7 @@ fn fill_by(
         }
     }
     // None has the sine asked for: the lowest regular degree is as good as any.
-    best.ok_or_else(|| {
-        failure.unwrap_or(Error::CornerEquations { place, residual: f64::NAN })
-    })
+    best.ok_or_else(|| failure.unwrap_or(Error::CornerEquations { place, residual: f64::NAN }))
 }
 
 fn fill_degree(

@@ -4,10 +4,10 @@ use geom_core::DVec3;
 
 use crate::boundary::four_curves::PatchBoundary;
 use crate::error::Place;
-use crate::warning::Warning;
-use crate::watch::Stop;
 use crate::patch::intersect::self_intersections;
 use crate::patch::surface::{BasisTable, Patch};
+use crate::warning::Warning;
+use crate::watch::Stop;
 
 /// Samples along each boundary curve.
 const BOUNDARY_SAMPLES: usize = 201;

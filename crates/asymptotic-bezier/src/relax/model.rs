@@ -68,7 +68,8 @@ impl Groups {
             let (v, end) = (ends[e], 2 * curve + e);
             let [a, b] = self.tilts.columns(v);
             let [stretch, turn] = self.arms.columns(end);
-            let own = [a, b, self.torsions.column(v, 0), stretch, turn, self.curvatures.column(end, 0)];
+            let own =
+                [a, b, self.torsions.column(v, 0), stretch, turn, self.curvatures.column(end, 0)];
             out[6 * e..6 * e + 6].copy_from_slice(&own);
         }
         out

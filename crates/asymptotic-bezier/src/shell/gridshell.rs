@@ -15,8 +15,6 @@ use crate::boundary::solved::Boundary;
 use crate::curve::bezier::CurveQuality;
 use crate::data::corners::AsymptoticNet;
 use crate::error::{Error, Place};
-use crate::warning::Warning;
-use crate::watch::Watch;
 use crate::patch::mask::Interior;
 use crate::patch::options::{Ansatz, PatchOptions};
 use crate::patch::solve::{FilledPatch, extended_patch, fill_patch};
@@ -25,6 +23,8 @@ use crate::patch::verify::PatchCheck;
 use crate::shell::joins::Joins;
 use crate::shell::joint_solve::fill_joint;
 use crate::stages::{JOINT, PATCH};
+use crate::warning::Warning;
+use crate::watch::Watch;
 
 /// Samples along a shared curve.
 const JOIN_SAMPLES: usize = 41;
@@ -88,10 +88,7 @@ pub struct GridshellCheck {
 ///
 /// # Errors
 /// The first hard fault (see [`Error`]), with its curve, vertex or patch.
-pub fn fill_net(
-    net: &AsymptoticNet,
-    options: &GridshellOptions,
-) -> Result<Gridshell, Error> {
+pub fn fill_net(net: &AsymptoticNet, options: &GridshellOptions) -> Result<Gridshell, Error> {
     let mut nobody = ();
     let watch = &mut Watch::quiet(&mut nobody);
     let boundary = boundary_of(net, &options.boundary, watch)?;
@@ -186,7 +183,8 @@ pub(crate) fn filled_patches(
     let patches: Vec<FilledPatch> = if watch.is_extended() {
         // One after the other, because the caller's function is one.
         let each = outlines.iter().enumerate();
-        each.map(|(f, outline)| extended_patch(outline, options, f, watch)).collect::<Result<_, _>>()
+        each.map(|(f, outline)| extended_patch(outline, options, f, watch))
+            .collect::<Result<_, _>>()
     } else {
         let fill = |f: usize| fill_patch(&outlines[f], options, Place::Patch(f));
         watch.each(outlines.len(), |f, _| fill(f))?.into_iter().collect()

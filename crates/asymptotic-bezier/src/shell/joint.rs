@@ -60,12 +60,7 @@ pub(super) fn started<'a>(
     let n = degree.unwrap_or(p + 2);
     let (min, max) = (p + 1, crate::patch::thin_plate::MAX_SURFACE_DEGREE);
     if !(min..=max).contains(&n) {
-        return Err(Error::Degree {
-            what: "jointly filled surface",
-            degree: n,
-            min,
-            max,
-        });
+        return Err(Error::Degree { what: "jointly filled surface", degree: n, min, max });
     }
     let mut shared = continued(net);
     loop {

@@ -144,7 +144,8 @@ impl<'a> Reduced<'a> {
     }
 
     fn filled(&self, f: usize, patch: Patch, energy: f64, freedoms: usize) -> FilledPatch {
-        let open = self.joint.net.faces[f].curves.iter().filter(|c| !self.joint.shared[**c]).count();
+        let open =
+            self.joint.net.faces[f].curves.iter().filter(|c| !self.joint.shared[**c]).count();
         let shared = self.joint.net.faces[f].curves.len() - open;
         let mut warnings = Vec::new();
         if patch.least_sine(16) <= 0.0 {

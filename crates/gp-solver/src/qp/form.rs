@@ -53,8 +53,9 @@ impl LinearEquation {
 
     /// `w (b − Σ a x)`: how hard its [`square`](Self::square) pulls.
     pub(super) fn force(&self, square: &QuadraticTerm, x: &[f64]) -> f64 {
-        let trace: f64 =
-            (0..square.unknowns.len()).map(|a| square.hessian[a * (square.unknowns.len() + 1)]).sum();
+        let trace: f64 = (0..square.unknowns.len())
+            .map(|a| square.hessian[a * (square.unknowns.len() + 1)])
+            .sum();
         let length: f64 = {
             let mut entries = std::collections::BTreeMap::new();
             self.entries.iter().for_each(|(i, a)| *entries.entry(*i).or_insert(0.0) += a);
@@ -125,7 +126,10 @@ impl QuadraticForm {
                         let weighed = |v: &f64| slot.weight * v;
                         out.terms.push(QuadraticTerm {
                             unknowns: elements.columns(e).to_vec(),
-                            hessian: values[elements.jacobian_range(e)].iter().map(weighed).collect(),
+                            hessian: values[elements.jacobian_range(e)]
+                                .iter()
+                                .map(weighed)
+                                .collect(),
                             gradient: rows[elements.rows(e)].iter().map(weighed).collect(),
                         });
                     }

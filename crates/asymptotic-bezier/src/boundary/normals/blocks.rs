@@ -125,7 +125,9 @@ impl Exactness {
         }
         for (k, [(a, e), (b, f)]) in self.curves.continued.iter().enumerate() {
             let element = self.curves.curves.len() + k;
-            let lines = Continuation { curves: [(&self.curves.curves[*a], *e), (&self.curves.curves[*b], *f)] };
+            let lines = Continuation {
+                curves: [(&self.curves.curves[*a], *e), (&self.curves.curves[*b], *f)],
+            };
             let mut slopes = [[0.0; COLUMNS]; 2];
             let wanted = jacobian.is_some().then_some(&mut slopes);
             let row = self.elements.rows(element).start;
@@ -159,5 +161,43 @@ impl ResidualBlock for Exactness {
 
     fn linearize(&self, x: &[f64], residuals: &mut [f64], jacobian: &mut [f64]) {
         self.fill(x, residuals, Some(jacobian));
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::data::corners::AsymptoticNet;
+    use geom_core::{DVec3, PolyMesh};
+    use gp_solver::check_jacobian;
+
+    /// Two by two quads on Enneper's surface: one line goes on through every inner edge.
+    fn curves() -> Arc<NormalCurves> {
+        let point = |k: usize| {
+            let (p, q) = (0.2 + 0.4 * (k / 3) as f64, 0.1 + 0.4 * (k % 3) as f64);
+            let (u, v) = (0.5 * (p + q), 0.5 * (p - q));
+            let cubic = |a: f64, b: f64| a - a.powi(3) / 3.0 + a * b * b;
+            DVec3::new(cubic(u, v), cubic(v, u), u * u - v * v)
+        };
+        let faces = [0, 1, 3, 4].map(|a: u32| [a, a + 3, a + 4, a + 1]);
+        let mesh = PolyMesh::new((0..9).map(point).collect(), &faces).unwrap();
+        let net = AsymptoticNet::from_mesh(&mesh).unwrap();
+        Arc::new(NormalCurves::of_net(&net).unwrap())
+    }
+
+    #[test]
+    fn derivatives_of_the_blocks_agree_with_differences() {
+        let curves = curves();
+        assert!(!curves.continued.is_empty());
+        let moved = |(k, x): (usize, &f64)| x + 0.05 * (1.3 * k as f64).sin();
+        let x: Vec<f64> = curves.start().iter().enumerate().map(moved).collect();
+        let mut exact = Exactness::new(&curves);
+        exact.reweight(10.0, &x);
+        // With multipliers from another place.
+        exact.reweight(30.0, curves.start());
+        for block in [&Fairness::new(&curves) as &dyn ResidualBlock, &exact, &curves.closeness()] {
+            let worst = check_jacobian(block, &x).unwrap().unwrap();
+            assert!(worst.error < 1e-6, "{worst:?}");
+        }
     }
 }

@@ -102,8 +102,7 @@ impl NormalCurves {
                 let v = curve.ends[e];
                 let line = &lines[&(i, e)];
                 columns[3 * e..3 * e + 3].copy_from_slice(&normals.columns::<3>(v));
-                columns[LINE[e]..LINE[e] + 3]
-                    .copy_from_slice(&tangents.columns::<3>(line.tangent));
+                columns[LINE[e]..LINE[e] + 3].copy_from_slice(&tangents.columns::<3>(line.tangent));
                 let speed = DATA_DEGREE as f64 * curve.arms[e].length();
                 let forward = [1.0, -1.0][e];
                 CurveEnd {
