@@ -77,7 +77,7 @@ pub use patch::verify::PatchCheck;
 pub use relax::relaxed::{RelaxOptions, Relaxed, relax, relax_patch};
 pub use shell::gridshell::{Gridshell, GridshellCheck, GridshellOptions, JoinCheck, fill_net};
 pub use shell::joins::Joins;
-pub use solve::{Solution, problem, solve, solve_with};
+pub use solve::{Solution, problem, solve, solve_with, variables};
 pub use stages::{BOUNDARY, CONTROL_POINTS, FIELDS, JOINT, PATCH, Phase, RELAXATION, TORSIONS};
 pub use warning::Warning;
 pub use wishes::TorsionWish;

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use gp_solver::{Extra, Fingerprint, Observer, Problem, RunReport, Status};
+use gp_solver::{Extra, Fingerprint, Observer, Problem, RunReport, Status, Variables};
 
 use crate::boundary::options::{BoundaryOptions, TorsionHandle};
 use crate::boundary::quad::{Quadrilateral, doubt_of, quadrilateral_of};
@@ -186,6 +186,14 @@ pub fn problem(input: &Input, options: &Options, phase: Phase) -> Result<Problem
             patch_problem(&outlines[0], &patch, Place::Patch(0))
         }
     }
+}
+
+/// The named unknowns of a stage, those fixed that stay.
+///
+/// # Errors
+/// As [`problem`].
+pub fn variables(input: &Input, options: &Options, phase: Phase) -> Result<Variables, Error> {
+    Ok(problem(input, options, phase)?.variables().clone())
 }
 
 /// What is known before anything is solved.

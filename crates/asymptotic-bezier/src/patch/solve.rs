@@ -1,8 +1,8 @@
 //! Fills a boundary: the freedoms of least energy, bounds where the patch would fold, higher degrees
 //! where bounds do not help.
 
-use numerics::minimize_quadratic;
 use gp_solver::{BlockId, Group, Problem, QuadraticForm, Status, Variables};
+use numerics::minimize_quadratic;
 
 use crate::boundary::four_curves::PatchBoundary;
 use crate::error::{Error, Place};

@@ -1,10 +1,10 @@
 //! The minimum of all patches of a net at once.
 
 use geom_core::DVec3;
-use numerics::{Matrix, axpy};
 use gp_solver::{
     Group, Problem, QuadraticForm, QuadraticTerm, SolverError, SparseQp, Status, Variables,
 };
+use numerics::{Matrix, axpy};
 use rayon::prelude::*;
 
 use crate::boundary::four_curves::PatchBoundary;
