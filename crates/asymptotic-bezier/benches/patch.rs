@@ -2,8 +2,8 @@
 #![allow(missing_docs, reason = "criterion's macros make undocumented items")]
 
 use asymptotic_bezier::{
-    AsymptoticNet, BoundaryOptions, DataFile, GridshellOptions, Input, PatchCheck, PatchOptions,
-    Place, fill_net, fill_patch, solve_quadrilateral,
+    AsymptoticNet, BoundaryOptions, DataFile, GridshellOptions, InputData, PatchCheck,
+    PatchOptions, Place, fill_net, fill_patch, solve_quadrilateral,
 };
 use criterion::{BenchmarkId, Criterion, criterion_group, criterion_main};
 use geom_core::{DVec3, PolyMesh};
@@ -14,9 +14,9 @@ fn corner_data() -> asymptotic_bezier::CornerData {
     let options =
         ron::Options::default().with_default_extension(ron::extensions::Extensions::IMPLICIT_SOME);
     let file: DataFile = options.from_str(text).expect("a valid example");
-    match file.input().expect("a valid example").0 {
-        Input::Patch(data) => *data,
-        Input::Net(_) => unreachable!("the example is one patch"),
+    match file.input().expect("a valid example").data {
+        InputData::Patch(data) => *data,
+        _ => unreachable!("the example is one patch"),
     }
 }
 

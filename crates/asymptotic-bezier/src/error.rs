@@ -1,6 +1,10 @@
-//! What cannot be attempted, and what is built but worth a word.
+//! What cannot be attempted.
 
 use std::fmt;
+
+use gp_solver::SolverError;
+
+use crate::faults::{DataFault, NetFault};
 
 /// Which of the four boundary curves or which corner of a net a message is about.
 ///
@@ -38,7 +42,7 @@ impl fmt::Display for Place {
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 #[expect(missing_docs, reason = "the messages spell out every field")]
-pub enum AsymptoticError {
+pub enum Error {
     /// NaN or infinity in the input.
     #[error("{place}: {what} is not finite; every coordinate and curvature must be a number")]
     NotFinite { place: Place, what: &'static str },
@@ -119,7 +123,7 @@ pub enum AsymptoticError {
     JoinsNeedModule,
     /// The system of all patches together.
     #[error("the system of all patches cannot be solved ({0}); fill them with G1 joins")]
-    Joint(#[source] gp_solver::SolverError),
+    Joint(#[source] SolverError),
     /// Curves from normals on a net whose vertices do not alternate.
     #[error(
         "the curves do not fall into two families (an inner vertex of odd valence, or a net that cannot be coloured), so no normals with K < 0 run along them; make the curves from curvatures"
@@ -132,10 +136,10 @@ pub enum AsymptoticError {
     NoTwist { share: f64 },
     /// Least squares for the curves of a net.
     #[error("the curves of the net cannot be solved for ({0}); mend tangents and curvatures")]
-    Curves(#[source] gp_solver::SolverError),
+    Curves(#[source] SolverError),
     /// A curve from normals that does not reach its end.
     #[error(
-        "{place}: no curve from normals reaches its end (gap {gap:.3e} chords); make the net exactly asymptotic first (umbilic hnet does), or refine it"
+        "{place}: no curve from normals reaches its end (gap {gap:.3e} chords); make the net exactly asymptotic first, with planar vertex stars, or refine it"
     )]
     NotClosed { place: Place, gap: f64 },
     /// Degree outside what the construction offers.
@@ -152,84 +156,44 @@ pub enum AsymptoticError {
     )]
     QuarticInfeasible { residual: f64 },
     /// The input file lacks a field or contradicts itself.
-    #[error("{message}")]
-    Data { message: String },
+    #[error(transparent)]
+    Data(#[from] DataFault),
     /// The net is not a net of quads with curves along its edges.
-    #[error("net: {message}")]
-    Net { message: String },
-}
-
-/// What was built although the user should know something about it.
-#[derive(Clone, Debug, PartialEq, thiserror::Error)]
-#[non_exhaustive]
-#[expect(missing_docs, reason = "the messages spell out every field")]
-pub enum AsymptoticWarning {
-    /// `∫ |τ| ds` above 180 degrees.
+    #[error(transparent)]
+    Net(#[from] NetFault),
+    /// A setting outside its range.
+    #[error("`{name}` is {value}; it must be {need}")]
+    BadOption { name: &'static str, value: f64, need: &'static str },
+    /// A setting for curves from curvatures where curves from normals are asked for.
     #[error(
-        "{place}: the binormal turns by {degrees:.0} degrees (more than 180); check the end curvatures and tangents, or use the relaxed mode"
+        "`{name}` is for curves made from curvatures; drop it, or do not ask for `curves` from normals"
     )]
-    BinormalTurning { place: Place, degrees: f64 },
-    /// `τ` passes zero.
+    OnlyForCurvatures { name: &'static str },
+    /// Stresses need both moduli.
+    #[error("`{given}` is given without `{missing}`; give both or none")]
+    OneModulus { given: &'static str, missing: &'static str },
+    /// Blocks of the caller's on control points that a mask sets afterwards.
     #[error(
-        "{place}: torsion changes sign ({min:.3e} to {max:.3e}), so the Gaussian curvature vanishes on it: not a strict saddle"
+        "a mask finds the inner control points when all else is solved, so nothing can be added to \
+         the problem of a patch; set `interior` to thin_plate"
     )]
-    TorsionSignChange { place: Place, min: f64, max: f64 },
-    /// The corner torsions do not follow one pattern.
+    ExtendedMask,
+    /// Equations of the caller's that contradict the data or one another.
     #[error(
-        "{place}: corner torsions of different sign ({values:?} for the curves in the u-direction); a strict saddle needs one sign"
+        "stage {stage}: the equations that were added contradict what holds already, defect \
+         {violation:.3e}; drop one"
     )]
-    CornerTorsionSigns { place: Place, values: [f64; 4] },
-    /// Curvature almost zero somewhere.
+    Infeasible { stage: String, violation: f64 },
+    /// The observer asked to stop before there was a result.
     #[error(
-        "{place}: curvature falls to {ratio:.4} of its maximum (below 0.02), a near-inflection; the tangent plane is badly determined there"
+        "the run was interrupted in the stage {stage}, before there was a surface; resume it from \
+         its checkpoint"
     )]
-    NearZeroCurvature { place: Place, ratio: f64 },
-    /// `K > 0` inside.
-    #[error("{place}: Gaussian curvature is positive on {percent:.1} % of the patch")]
-    PositiveGauss { place: Place, percent: f64 },
-    /// The patch meets itself.
-    #[error("{place}: the patch intersects itself ({pairs} pairs of sampled triangles)")]
-    SelfIntersection { place: Place, pairs: usize },
-    /// Another choice of curvature signs turns much less.
-    #[error(
-        "{place}: with curvature signs {signs} the binormals turn by at most {best_degrees:.0} degrees instead of {degrees:.0}; check the signs"
-    )]
-    BetterBranch { place: Place, signs: String, best_degrees: f64, degrees: f64 },
-    /// Torsions of different sign at the two ends of a line.
-    #[error(
-        "{place}: the neighbours give the ends of this line torsions of opposite sign ({start:.3e}, {end:.3e}); the Gaussian curvature vanishes somewhere on it"
-    )]
-    LineTorsionSigns { place: Place, start: f64, end: f64 },
-    /// Nearly tangent parameter lines.
-    #[error("{place}: parameter lines meet at a sine of only {sine:.3}; raise the degree")]
-    LowSine { place: Place, sine: f64 },
-    /// The thin-plate optimum folded, so bounds were added.
-    #[error("{place}: transversality bounds were needed to keep the boundary from folding")]
-    BoundsActive { place: Place },
-    /// The degree asked for did not work and a higher one was taken.
-    #[error("{place}: bi-{from} was not regular, bi-{to} is used")]
-    DegreeRaised { place: Place, from: usize, to: usize },
-    /// A patch of a joint fill folds.
-    #[error(
-        "{place}: with {shared} of its joins C1 the patch folds; use G1 joins or a higher degree"
-    )]
-    JointFold { place: Place, shared: usize },
-    /// Neighbouring normals far apart: the surface folds or has a singular point.
-    #[error(
-        "{place}: neighbouring normals turn by {degrees:.0} degrees, the patch is singular or folds there"
-    )]
-    NormalFlip { place: Place, degrees: f64 },
-    /// Odd interior valence.
-    #[error(
-        "{place}: interior vertex of odd valence {valence}; torsion and Gaussian curvature are zero there"
-    )]
-    OddValence { place: Place, valence: usize },
-    /// Curves from normals that leave the edges of their mesh far behind.
-    #[error(
-        "{place}: a curve had to turn by {degrees:.0} degrees from what the edges let expect (more than 20), so the surface is rough; make the net exactly asymptotic first (umbilic hnet does), or refine it"
-    )]
-    RoughNet { place: Place, degrees: f64 },
-    /// The torsion equation at a corner carries no unknown and is satisfied anyway.
-    #[error("{place}: the torsion equation is vacuous, one extra freedom is left to the energy")]
-    VacuousTorsion { place: Place },
+    Interrupted { stage: String },
+    /// There is no such stage with these options.
+    #[error("there is no stage `{stage}` with these options; {remedy}")]
+    NoSuchStage { stage: &'static str, remedy: &'static str },
+    /// A block, a checkpoint, a factorisation.
+    #[error(transparent)]
+    Solver(#[from] SolverError),
 }

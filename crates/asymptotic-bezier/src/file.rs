@@ -5,11 +5,11 @@ use std::collections::BTreeMap;
 use geom_core::DVec3;
 use serde::{Deserialize, Serialize};
 
-use crate::boundary::options::TorsionHandle;
 use crate::data::corners::{AsymptoticNet, CornerData, Curvatures, NetCurve};
-use crate::data::vertex::{arm_signs, bilinear_torsions, vertex_frames};
-use crate::design::Input;
-use crate::error::AsymptoticError;
+use crate::error::Error;
+use crate::faults::DataFault;
+use crate::input::{Input, InputData};
+use crate::wishes::{CORNERS, TorsionWish};
 
 /// Content of an input file. Either the fields of a patch (`X`, `P_i1`, `P_i4` and `signed_k` or
 /// `unsigned_k`) or those of a net (`vertices`, `quads`, `curves`) are there.
@@ -81,152 +81,44 @@ pub struct FileCurve {
     pub inflections: usize,
 }
 
-/// A wish for the torsion at a corner.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-pub enum TorsionWish {
-    /// This value, in 1/length.
-    Fixed(f64),
-    /// Between two values.
-    Between(f64, f64),
-    /// The Gaussian curvature (at most zero) and the sign of the torsion; zero takes the twist of
-    /// the vertices around.
-    Gaussian(f64, f64),
-    /// The Gaussian curvature between two values, and the sign.
-    GaussianBetween(f64, f64, f64),
-}
-
-impl TorsionWish {
-    /// What no vertex can have.
-    fn fault(self) -> Option<String> {
-        let numbers: &[f64] = match &self {
-            Self::Fixed(tau) => &[*tau],
-            Self::Between(min, max) => &[*min, *max],
-            Self::Gaussian(k, sign) => &[*k, *sign],
-            Self::GaussianBetween(min, max, sign) => &[*min, *max, *sign],
-        };
-        if numbers.iter().any(|n| n.is_nan()) {
-            return Some("a number is NaN; give numbers".into());
-        }
-        match self {
-            Self::Gaussian(k, _) | Self::GaussianBetween(_, k, _) if k > 0.0 => Some(format!(
-                "the Gaussian curvature {k} is above zero, but it is minus the torsion squared; give at most 0"
-            )),
-            _ => None,
-        }
-    }
-
-    /// The handle; `sign` is that of the torsion where the wish leaves it open.
-    fn handle(self, sign: f64) -> TorsionHandle {
-        let open = |wished: f64| if wished == 0.0 { sign } else { wished };
-        match self {
-            Self::Fixed(tau) => TorsionHandle::Fixed(tau),
-            Self::Between(min, max) => TorsionHandle::Between(min, max),
-            Self::Gaussian(k, wished) => TorsionHandle::gaussian(k, open(wished)),
-            Self::GaussianBetween(min, max, wished) => {
-                TorsionHandle::gaussian_between(min, max, open(wished))
-            }
-        }
-    }
-}
-
-/// The torsion handles per corner or vertex that wishes by corner name or vertex number stand for.
-///
-/// Wishes for the Gaussian curvature that leave the sign of the torsion open (zero) get that of
-/// the bilinear patches over the vertices.
-///
-/// # Errors
-/// [`AsymptoticError::Data`] names the wish without a corner or vertex.
-pub fn torsion_handles(
-    input: &Input,
-    wishes: &BTreeMap<String, TorsionWish>,
-) -> Result<Vec<TorsionHandle>, AsymptoticError> {
-    if wishes.is_empty() {
-        return Ok(Vec::new());
-    }
-    let twists = match input {
-        Input::Patch(data) => twist_signs(&data.to_net(data.curvatures.values())),
-        Input::Net(net) => twist_signs(net),
-    };
-    let mut handles = vec![TorsionHandle::Free; twists.len()];
-    for (name, wish) in wishes {
-        let found = match input {
-            Input::Patch(_) => CORNERS.iter().position(|c| c == name),
-            Input::Net(_) => name.parse::<usize>().ok().filter(|v| *v < handles.len()),
-        };
-        let Some(v) = found else {
-            let names = if matches!(input, Input::Patch(_)) {
-                "use 00, 10, 01 or 11".to_owned()
-            } else {
-                format!("use a vertex number below {}", handles.len())
-            };
-            return refuse(&format!("`torsions` has \"{name}\"; {names}"));
-        };
-        if let Some(message) = wish.fault() {
-            return refuse(&format!("`torsions` of \"{name}\": {message}"));
-        }
-        handles[v] = wish.handle(twists[v]);
-    }
-    Ok(handles)
-}
-
-/// Signs of the torsions that the bilinear patches of a net have; data at fault give `+1`, the
-/// solver names the fault.
-fn twist_signs(net: &AsymptoticNet) -> Vec<f64> {
-    let mut projected = net.clone();
-    match vertex_frames(&mut projected, f64::INFINITY) {
-        Ok(frames) => {
-            let torsions = bilinear_torsions(net, &arm_signs(net, &frames), &frames);
-            torsions.into_iter().map(f64::signum).collect()
-        }
-        Err(_) => vec![1.0; net.positions().len()],
-    }
-}
-
-const CORNERS: [&str; 4] = ["00", "10", "01", "11"];
-
 impl DataFile {
-    /// The input this file describes, and the torsion handles per corner or vertex.
+    /// The input this file describes, with its wishes.
     ///
     /// # Errors
-    /// [`AsymptoticError::Data`] names the field that is missing or contradictory; nets are
-    /// checked as by [`AsymptoticNet::new`].
-    pub fn input(&self) -> Result<(Input, Vec<TorsionHandle>), AsymptoticError> {
+    /// [`Error::Data`] names the field that is missing or contradictory; nets are checked as by
+    /// [`AsymptoticNet::new`].
+    pub fn input(&self) -> Result<Input, Error> {
         let is_net = self.vertices.is_some() || self.quads.is_some() || self.curves.is_some();
         let is_patch = self.corners.is_some();
-        let input = match (is_net, is_patch) {
-            (true, true) => refuse("both `X` and `vertices` are given; keep one of patch and net"),
-            (false, false) => {
-                refuse("neither `X` nor `vertices` is given; one of patch and net is needed")
-            }
+        let data = match (is_net, is_patch) {
+            (true, true) => Err(DataFault::PatchAndNet.into()),
+            (false, false) => Err(DataFault::Empty.into()),
             (true, false) => self.net(),
             (false, true) => self.patch(),
         }?;
-        let handles = torsion_handles(&input, &self.torsions)?;
-        Ok((input, handles))
+        Ok(Input { data, torsions: self.torsions.clone() })
     }
 
-    fn patch(&self) -> Result<Input, AsymptoticError> {
+    fn patch(&self) -> Result<InputData, Error> {
         let corners = self.corners.as_ref().ok_or_else(|| missing("X"))?;
         let mut x = [DVec3::ZERO; 4];
         for (c, name) in CORNERS.iter().enumerate() {
             let Some(point) = corners.get(*name) else {
-                return refuse(&format!("`X` has no corner \"{name}\"; 00, 10, 01, 11 are needed"));
+                return Err(DataFault::NoCorner { name }.into());
             };
             x[c] = DVec3::from_array(*point);
         }
         if corners.len() > 4 {
-            return refuse("`X` has more than the corners 00, 10, 01, 11; drop the others");
+            return Err(DataFault::MoreCorners.into());
         }
-        let points = |p: Option<[[f64; 3]; 4]>, name: &str| {
+        let points = |p: Option<[[f64; 3]; 4]>, name: &'static str| {
             p.map(|p| p.map(DVec3::from_array)).ok_or_else(|| missing(name))
         };
         let curvatures = match (self.signed_k, self.unsigned_k) {
             (Some(k), None) => Curvatures::Signed(k),
             (None, Some(k)) => Curvatures::Unsigned(k),
-            (None, None) => return Err(missing("signed_k` or `unsigned_k")),
-            (Some(_), Some(_)) => {
-                return refuse("both `signed_k` and `unsigned_k` are given; keep one");
-            }
+            (None, None) => return Err(DataFault::NoCurvatures.into()),
+            (Some(_), Some(_)) => return Err(DataFault::TwoCurvatures.into()),
         };
         let data = CornerData {
             corners: x,
@@ -236,20 +128,18 @@ impl DataFile {
             lines: self.lines.unwrap_or_default(),
             inflections: self.inflections.unwrap_or_default(),
         };
-        Ok(Input::Patch(Box::new(data)))
+        Ok(InputData::Patch(Box::new(data)))
     }
 
-    fn net(&self) -> Result<Input, AsymptoticError> {
+    fn net(&self) -> Result<InputData, Error> {
         let vertices = self.vertices.as_ref().ok_or_else(|| missing("vertices"))?;
         let quads = self.quads.as_ref().ok_or_else(|| missing("quads"))?;
         let curves = self.curves.as_ref().ok_or_else(|| missing("curves"))?;
         let positions: Vec<DVec3> = vertices.iter().map(|p| DVec3::from_array(*p)).collect();
         for (i, v) in curves.iter().enumerate().flat_map(|(i, c)| c.ends.map(|v| (i, v))) {
             if v >= positions.len() {
-                return refuse(&format!(
-                    "curve {i} ends at vertex {v}, but there are {} vertices",
-                    positions.len()
-                ));
+                let vertices = positions.len();
+                return Err(DataFault::NoVertex { curve: i, vertex: v, vertices }.into());
             }
         }
         let curves = curves
@@ -265,7 +155,7 @@ impl DataFile {
                 inflections: c.inflections,
             })
             .collect();
-        Ok(Input::Net(AsymptoticNet::new(positions, quads, curves)?))
+        Ok(InputData::Net(AsymptoticNet::new(positions, quads, curves)?))
     }
 
     /// The file that describes `data`.
@@ -318,10 +208,6 @@ impl DataFile {
     }
 }
 
-fn refuse<T>(message: &str) -> Result<T, AsymptoticError> {
-    Err(AsymptoticError::Data { message: message.to_owned() })
-}
-
-fn missing(field: &str) -> AsymptoticError {
-    AsymptoticError::Data { message: format!("field `{field}` is missing; add it") }
+fn missing(field: &'static str) -> Error {
+    DataFault::Missing { field }.into()
 }

@@ -4,14 +4,13 @@
 mod common;
 
 use asymptotic_bezier::{
-    AsymptoticError, AsymptoticNet, AsymptoticWarning, BoundaryOptions, CornerData, Curvatures,
-    CurveForm, DataFile, NetCurve, PatchOptions, Place, TorsionHandle, fill_patch, solve_boundary,
-    solve_quadrilateral,
+    AsymptoticNet, BoundaryOptions, CornerData, Curvatures, CurveForm, DataFile, Error, NetCurve,
+    PatchOptions, Place, TorsionHandle, Warning, fill_patch, solve_boundary, solve_quadrilateral,
 };
 use common::{reference_set, reference_sets};
 use geom_core::DVec3;
 
-fn refusal(change: impl FnOnce(&mut CornerData)) -> AsymptoticError {
+fn refusal(change: impl FnOnce(&mut CornerData)) -> Error {
     let mut data = reference_set("B").data;
     change(&mut data);
     solve_quadrilateral(&data, &BoundaryOptions::default()).unwrap_err()
@@ -25,7 +24,7 @@ fn signed(data: &mut CornerData) -> &mut [[f64; 2]; 4] {
 
 #[test]
 fn faulty_corner_data_are_refused_with_place_and_remedy() {
-    let cases: Vec<(AsymptoticError, &str)> = vec![
+    let cases: Vec<(Error, &str)> = vec![
         (refusal(|d| d.corners[1].x = f64::NAN), "corner 10: the position is not finite"),
         (
             refusal(|d| d.start_points[2].y = f64::INFINITY),
@@ -87,7 +86,7 @@ fn vacuous_torsion_equations_are_told_from_impossible_ones() {
     };
     let quad = solve_quadrilateral(&data, &BoundaryOptions::default()).unwrap();
     let place = Place::PatchCorner(0);
-    assert!(quad.warnings.contains(&AsymptoticWarning::VacuousTorsion { place }));
+    assert!(quad.warnings.contains(&Warning::VacuousTorsion { place }));
     // Lifting the end of r1 without tilting its tangent leaves nothing to answer with.
     for p in [&mut data.corners[1], &mut data.end_points[0], &mut data.start_points[3]] {
         p.z += 0.1;

@@ -5,9 +5,9 @@ mod common;
 
 use asymptotic_bezier::{
     AsymptoticNet, BoundaryEnergy, BoundaryOptions, CornerData, Curvatures, GridshellOptions,
-    Input, Interior, PatchCheck, PatchOptions, Place, Quadrilateral, TorsionHandle, TorsionWish,
-    fill_net, fill_patch, solve_boundary, solve_quadrilateral, solve_quartic_quadrilateral,
-    torsion_handles,
+    Input, Interior, Options, PatchCheck, PatchOptions, Place, Quadrilateral, TorsionHandle,
+    TorsionWish, fill_net, fill_patch, solve, solve_boundary, solve_quadrilateral,
+    solve_quartic_quadrilateral,
 };
 use common::star::star;
 use common::{catenoid, corner_data, enneper, exact_net, reference_set, wave};
@@ -140,20 +140,20 @@ fn gaussian_curvatures_are_wished_for_without_a_sign() {
     for mirrored in [false, true] {
         let flip = if mirrored { -1.0 } else { 1.0 };
         let data = reference_set("B").data;
-        let input = Input::Patch(Box::new(data.map_points(|p| DVec3::new(p.x, p.y, flip * p.z))));
-        let wishes = BTreeMap::from([
+        let data = data.map_points(|p| DVec3::new(p.x, p.y, flip * p.z));
+        let wished = |wishes: BTreeMap<String, TorsionWish>| {
+            let input = Input { torsions: wishes, ..data.clone().into() };
+            solve(&input, &Options::default(), &mut ())
+        };
+        let solution = wished(BTreeMap::from([
             ("11".to_owned(), TorsionWish::GaussianBetween(-0.25, -0.16, 0.0)),
             ("00".to_owned(), TorsionWish::Gaussian(-1.0, 0.0)),
-        ]);
-        let torsions = torsion_handles(&input, &wishes).unwrap();
-        let options = BoundaryOptions { torsions, ..Default::default() };
-        let Input::Patch(data) = &input else { unreachable!() };
-        let quad = solve_quadrilateral(data, &options).unwrap();
-        assert!((quad.torsions[0] - flip).abs() < 1e-12, "{:?}", quad.torsions);
-        assert!((quad.torsions[3] - 0.4 * flip).abs() < 1e-12, "{:?}", quad.torsions);
+        ]));
+        let torsions = solution.unwrap().result.boundary.torsions;
+        assert!((torsions[0] - flip).abs() < 1e-12, "{torsions:?}");
+        assert!((torsions[3] - 0.4 * flip).abs() < 1e-12, "{torsions:?}");
         let refused = |name: &str, wish| {
-            let wishes = BTreeMap::from([(name.to_owned(), wish)]);
-            torsion_handles(&input, &wishes).unwrap_err().to_string()
+            wished(BTreeMap::from([(name.to_owned(), wish)])).unwrap_err().to_string()
         };
         let error = refused("12", TorsionWish::Fixed(1.0));
         assert_eq!(error, "`torsions` has \"12\"; use 00, 10, 01 or 11");

@@ -3,9 +3,9 @@
 mod common;
 
 use asymptotic_bezier::{
-    AsymptoticNet, AsymptoticWarning, BoundaryOptions, CurveForm, Gridshell, GridshellCheck,
-    GridshellOptions, Joins, PatchCheck, PatchOptions, Place, TorsionHandle, fill_net, fill_patch,
-    solve_boundary, solve_quadrilateral,
+    AsymptoticNet, BoundaryOptions, CurveForm, Gridshell, GridshellCheck, GridshellOptions, Joins,
+    PatchCheck, PatchOptions, Place, TorsionHandle, Warning, fill_net, fill_patch, solve_boundary,
+    solve_quadrilateral,
 };
 use common::{catenoid, enneper, exact_net, reference_set, sampled_net};
 use geom_core::{DMat3, DVec3, PolyMesh};
@@ -32,8 +32,7 @@ fn hand_made_and_random_sets_are_warned_about() {
     for name in ["D", "E_", "F"] {
         let set = reference_set(name);
         let quad = solve_quadrilateral(&set.data, &BoundaryOptions::default()).unwrap();
-        let turning =
-            |w: &AsymptoticWarning| matches!(w, AsymptoticWarning::BinormalTurning { .. });
+        let turning = |w: &Warning| matches!(w, Warning::BinormalTurning { .. });
         assert!(quad.warnings.iter().any(turning), "{name}");
         println!("{name} {:?}", quad.warnings);
         let options = PatchOptions { degree: Some(7), ..Default::default() };
@@ -41,8 +40,7 @@ fn hand_made_and_random_sets_are_warned_about() {
         let check = PatchCheck::new(&filled.patch, &quad.boundary);
         println!("{name} energy {} {check:?}", filled.thin_plate_energy);
         let warnings = check.warnings(Place::Patch(0), 0.1);
-        let crossing =
-            |w: &AsymptoticWarning| matches!(w, AsymptoticWarning::SelfIntersection { .. });
+        let crossing = |w: &Warning| matches!(w, Warning::SelfIntersection { .. });
         assert!(warnings.iter().any(crossing), "{name}");
     }
 }

@@ -5,14 +5,14 @@
 mod common;
 
 use asymptotic_bezier::{
-    AsymptoticNet, AsymptoticWarning, BoundaryOptions, CornerData, Curvatures, CurveForm,
-    DesignOptions, Input, Joins, PatchCheck, PatchOptions, Place, TorsionHandle, design,
-    doubt_signs, fill_patch, solve_boundary, solve_quadrilateral, solve_quartic_quadrilateral,
+    AsymptoticNet, BoundaryOptions, CornerData, Curvatures, CurveForm, Joins, Options, PatchCheck,
+    PatchOptions, Place, TorsionHandle, Warning, doubt_signs, fill_patch, solve, solve_boundary,
+    solve_quadrilateral, solve_quartic_quadrilateral,
 };
 use common::{Gauss, catenoid, enneper, exact_net, reference_set, sampled_net};
 use geom_core::{DVec3, PolyMesh};
 
-fn said(warnings: &[AsymptoticWarning], words: &str) -> bool {
+fn said(warnings: &[Warning], words: &str) -> bool {
     warnings.iter().any(|w| w.to_string().contains(words))
 }
 
@@ -124,8 +124,8 @@ fn joint_patches_that_fold_are_told() {
     }
     let quads = [0, 1, 3, 4].map(|k| [k, k + 3, k + 4, k + 1]);
     let net = AsymptoticNet::new(net.positions().to_vec(), &quads, curves).unwrap();
-    let options = DesignOptions { joins: Joins::C1, ..Default::default() };
-    let folded = design(&Input::Net(net), &options).unwrap();
+    let options = Options { joins: Joins::C1, ..Default::default() };
+    let folded = solve(&net.into(), &options, &mut ()).unwrap();
     let words = "patch 1: with 2 of its joins C1 the patch folds; use G1 joins or a higher degree";
     assert!(said(&folded.check.warnings, words), "{:?}", folded.check.warnings);
 }
@@ -152,5 +152,5 @@ fn nets_that_are_only_roughly_asymptotic_are_told() {
     assert!(said(&rough, words), "{rough:?}");
     let error = curves(0.01).unwrap_err().to_string();
     assert!(error.contains(": no curve from normals reaches its end (gap "), "{error}");
-    assert!(error.ends_with("(umbilic hnet does), or refine it"), "{error}");
+    assert!(error.ends_with("with planar vertex stars, or refine it"), "{error}");
 }

@@ -97,6 +97,12 @@ pub trait ResidualBlock: Send + Sync {
         false
     }
 
+    /// Whether the rows are equations: to be zero, not small. Stages that are solved exactly, as
+    /// quadratic programs, make constraints of linear ones; least squares take them as other rows.
+    fn is_equation(&self) -> bool {
+        false
+    }
+
     /// Takes a new reference (the values the rows measure against) without a change of the
     /// Jacobian; returns whether the block has one of this length.
     fn set_reference(&mut self, _reference: &[f64]) -> bool {
@@ -124,6 +130,12 @@ pub trait EnergyBlock: Send + Sync {
     /// As [`ResidualBlock::admits`].
     fn admits(&self, _x: &[f64]) -> bool {
         true
+    }
+
+    /// Whether the Hessian is exact and the same for every `x`, so that a quadratic program can take
+    /// the energy.
+    fn is_quadratic(&self) -> bool {
+        false
     }
 
     /// The energy at `x`.
@@ -205,6 +217,9 @@ impl<T: ResidualBlock + ?Sized> ResidualBlock for &mut T {
     }
     fn is_linear(&self) -> bool {
         (**self).is_linear()
+    }
+    fn is_equation(&self) -> bool {
+        (**self).is_equation()
     }
     fn set_reference(&mut self, reference: &[f64]) -> bool {
         (**self).set_reference(reference)

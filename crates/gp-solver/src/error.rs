@@ -73,6 +73,12 @@ pub enum SolverError {
     /// A block put in the place of one with other elements.
     #[error("block `{block}` has other elements than the one it is to replace; add it instead")]
     OtherElements { block: String },
+    /// A block of a problem that is solved as a quadratic program.
+    #[error(
+        "block `{block}` is not quadratic, but its problem is solved exactly; give linear rows or a \
+         quadratic energy that say so"
+    )]
+    NotQuadratic { block: String },
     /// A factorisation that is not compiled in.
     #[error("this problem needs a sparse factorisation; build gp-solver with its feature `sparse`")]
     NeedsSparse,

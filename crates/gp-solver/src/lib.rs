@@ -94,7 +94,9 @@ pub use min_norm::{MinNormProjection, ProjectionOptions, ProjectionReport};
 pub use observer::{Observer, Progress};
 pub use options::{Factorization, Method, Options, Regularization};
 pub use problem::{BlockId, Problem};
-pub use qp::{DenseQp, QpSolution};
+#[cfg(feature = "sparse")]
+pub use qp::{BoundedQp, SparseQp};
+pub use qp::{DenseQp, LinearEquation, QpSolution, QuadraticForm, QuadraticTerm};
 pub use quadratic::{Equation, QuadraticBuilder, QuadraticConstraints};
 pub use report::{IterationRecord, Report, Status, Term, Timings};
 pub use schedule::{Extra, RunReport, Stage, StageReport};

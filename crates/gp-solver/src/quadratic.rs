@@ -38,6 +38,7 @@ pub struct QuadraticConstraints {
     constants: Vec<f64>,
     weights: Vec<f64>,
     is_linear: bool,
+    is_equation: bool,
 }
 
 /// Collects the coefficients of [`QuadraticConstraints`]; start each equation with
@@ -109,6 +110,13 @@ impl QuadraticBuilder {
         self.equations.is_empty()
     }
 
+    /// Plans the equations as such: to hold exactly where the method can, which is where they are
+    /// linear and a stage is a quadratic program.
+    #[must_use]
+    pub fn build_exact(self) -> QuadraticConstraints {
+        QuadraticConstraints { is_equation: true, ..self.build() }
+    }
+
     /// Plans the equations.
     #[must_use]
     pub fn build(self) -> QuadraticConstraints {
@@ -121,6 +129,7 @@ impl QuadraticBuilder {
             constants: Vec::new(),
             weights: Vec::new(),
             is_linear: true,
+            is_equation: false,
         };
         let mut columns = Vec::new();
         for equation in &self.equations {
@@ -281,5 +290,9 @@ impl ResidualBlock for QuadraticConstraints {
 
     fn is_linear(&self) -> bool {
         self.is_linear
+    }
+
+    fn is_equation(&self) -> bool {
+        self.is_equation
     }
 }

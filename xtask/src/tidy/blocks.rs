@@ -7,9 +7,6 @@ use std::collections::BTreeSet;
 
 /// Blocks without such a test; this list may only become shorter.
 const EXCEPTED: &[&str] = &[
-    "asymptotic-bezier: Exactness",
-    "asymptotic-bezier: Fairness",
-    "asymptotic-bezier: TorsionRows",
     "hyperbolic-nets: Combinations",
     "hyperbolic-nets: FramePoints",
     "hyperbolic-nets: Proximity",

@@ -1,6 +1,7 @@
 //! The boundary curves of a net or of one patch, solved from tangents and curvatures at the corners
 //! or from normals.
 
+pub(crate) mod curve_energy;
 pub(crate) mod four_curves;
 pub(crate) mod inflection;
 pub(crate) mod normals;
@@ -10,4 +11,3 @@ pub(crate) mod quartic;
 pub(crate) mod solve;
 pub(crate) mod solved;
 pub(crate) mod torsion_energy;
-pub(crate) mod torsion_qp;

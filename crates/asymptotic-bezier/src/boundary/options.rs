@@ -1,10 +1,14 @@
 //! What may be asked of the boundary curves: degree, energy, torsions.
 
+use gp_solver::choices;
+use serde::{Deserialize, Serialize};
+
 /// Least and highest degree of solved boundary curves.
 pub const BOUNDARY_DEGREES: [usize; 2] = [5, 9];
 
 /// What the freedom left by the corner data minimises (Wang et al. 2019, Remark 3.4).
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
 pub enum BoundaryEnergy {
     /// `Σ ∫ |r″|² dt`, the paper's Eq. 3.4.
     #[default]
@@ -14,6 +18,8 @@ pub enum BoundaryEnergy {
     /// `Σ L ∫ τ² ds` with the chord `L`, over the corner torsions from the strain minimum.
     Torsion,
 }
+
+choices!(BoundaryEnergy { Strain = "strain", Jerk = "jerk", Torsion = "torsion" });
 
 /// What is wanted of the torsion at a vertex; `K = −τ²` there.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -52,7 +58,8 @@ impl TorsionHandle {
 }
 
 /// What the boundary curves are made from.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
 pub enum CurveForm {
     /// By curvatures, but by normals where tangents and curvatures are estimates (nets made from meshes
     /// and polylines) and a curve between two vertices has an inflection, or nearly one.
@@ -64,6 +71,8 @@ pub enum CurveForm {
     /// `r′ = ± N × N′`, which inflections do not disturb; curvatures are met approximately.
     Normals,
 }
+
+choices!(CurveForm { Auto = "auto", Curvatures = "curvatures", Normals = "normals" });
 
 /// Settings of the boundary solve.
 #[derive(Clone, Debug, PartialEq)]

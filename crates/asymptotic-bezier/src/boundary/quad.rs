@@ -2,10 +2,12 @@
 
 use crate::boundary::four_curves::PatchBoundary;
 use crate::boundary::options::BoundaryOptions;
-use crate::boundary::solve::solve_boundary;
+use crate::boundary::solve::boundary_of;
 use crate::curve::bezier::{BezierCurve, CurveQuality};
 use crate::data::corners::{CURVE_CORNERS, CornerData, Curvatures, DATA_DEGREE};
-use crate::error::{AsymptoticError, AsymptoticWarning, Place};
+use crate::error::{Error, Place};
+use crate::warning::Warning;
+use crate::watch::Watch;
 
 /// Binormal turning above which a curve is warned about, in radians.
 pub(crate) const TURNING_LIMIT: f64 = std::f64::consts::PI;
@@ -35,7 +37,7 @@ pub struct Quadrilateral {
     /// Number of unknowns the energy decided.
     pub freedoms: usize,
     /// What should be looked at.
-    pub warnings: Vec<AsymptoticWarning>,
+    pub warnings: Vec<Warning>,
 }
 
 impl Quadrilateral {
@@ -80,7 +82,7 @@ impl Quadrilateral {
 /// curvatures the signs are kept; [`doubt_signs`] tells whether others would be better.
 ///
 /// # Errors
-/// The hard faults of [`AsymptoticError`].
+/// The hard faults of [`Error`].
 ///
 /// # Example
 /// ```
@@ -103,18 +105,27 @@ impl Quadrilateral {
 /// };
 /// let quad = solve_quadrilateral(&data, &BoundaryOptions::default())?;
 /// assert!((quad.torsions[0] - 0.2766541628).abs() < 1e-9);
-/// # Ok::<(), asymptotic_bezier::AsymptoticError>(())
+/// # Ok::<(), asymptotic_bezier::Error>(())
 /// ```
 pub fn solve_quadrilateral(
     data: &CornerData,
     options: &BoundaryOptions,
-) -> Result<Quadrilateral, AsymptoticError> {
+) -> Result<Quadrilateral, Error> {
+    quadrilateral_of(data, options, &mut Watch::quiet(&mut ()))
+}
+
+/// [`solve_quadrilateral`], watched.
+pub(crate) fn quadrilateral_of(
+    data: &CornerData,
+    options: &BoundaryOptions,
+    watch: &mut Watch<'_, '_>,
+) -> Result<Quadrilateral, Error> {
     match data.curvatures {
-        Curvatures::Signed(k) => solve_signed(data, &k, options),
-        Curvatures::Unsigned(k) => match best_branch(data, &k, options) {
+        Curvatures::Signed(k) => solve_signed(data, &k, options, watch),
+        Curvatures::Unsigned(k) => match best_branch(data, &k, options, watch)? {
             Some(quad) => Ok(quad),
             // No branch can be solved: the first one tells why.
-            None => solve_signed(data, &branch(&k, data, 0), options),
+            None => solve_signed(data, &branch(&k, data, 0), options, watch),
         },
     }
 }
@@ -126,8 +137,23 @@ pub fn doubt_signs(
     data: &CornerData,
     quad: &Quadrilateral,
     options: &BoundaryOptions,
-) -> Option<AsymptoticWarning> {
-    let best = best_branch(data, &quad.curvatures, options)?;
+) -> Option<Warning> {
+    // Nobody stops it.
+    doubt_of(data, quad, options, &mut Watch::quiet(&mut ())).ok().flatten()
+}
+
+/// [`doubt_signs`], watched.
+pub(crate) fn doubt_of(
+    data: &CornerData,
+    quad: &Quadrilateral,
+    options: &BoundaryOptions,
+    watch: &mut Watch<'_, '_>,
+) -> Result<Option<Warning>, Error> {
+    Ok(best_branch(data, &quad.curvatures, options, watch)?
+        .and_then(|best| better_branch(data, quad, &best)))
+}
+
+fn better_branch(data: &CornerData, quad: &Quadrilateral, best: &Quadrilateral) -> Option<Warning> {
     if best.turning() * BRANCH_RATIO >= quad.turning() {
         return None;
     }
@@ -139,7 +165,7 @@ pub fn doubt_signs(
             format!("r{} {start}{end}", i + 1)
         })
         .collect();
-    Some(AsymptoticWarning::BetterBranch {
+    Some(Warning::BetterBranch {
         place: Place::Patch(0),
         signs: signs.join(", "),
         best_degrees: best.turning().to_degrees(),
@@ -160,14 +186,20 @@ fn best_branch(
     data: &CornerData,
     k: &[[f64; 2]; 4],
     options: &BoundaryOptions,
-) -> Option<Quadrilateral> {
+    watch: &mut Watch<'_, '_>,
+) -> Result<Option<Quadrilateral>, Error> {
     let mut best: Option<Quadrilateral> = None;
     for b in 0..16 {
         // A line has no sign to choose.
         if (0..4).any(|i| data.lines[i] && b >> i & 1 == 1) {
             continue;
         }
-        let Ok(quad) = solve_signed(data, &branch(k, data, b), options) else { continue };
+        watch.check()?;
+        let quad = match solve_signed(data, &branch(k, data, b), options, watch) {
+            Ok(quad) => quad,
+            Err(error @ Error::Interrupted { .. }) => return Err(error),
+            Err(_) => continue,
+        };
         let better = best.as_ref().is_none_or(|best| {
             let (a, b) = (quad.turning(), best.turning());
             a < b * (1.0 - 1e-9)
@@ -177,7 +209,7 @@ fn best_branch(
             best = Some(quad);
         }
     }
-    best
+    Ok(best)
 }
 
 /// Solves with the curvature signs as they are.
@@ -185,9 +217,10 @@ pub(crate) fn solve_signed(
     data: &CornerData,
     signed: &[[f64; 2]; 4],
     options: &BoundaryOptions,
-) -> Result<Quadrilateral, AsymptoticError> {
+    watch: &mut Watch<'_, '_>,
+) -> Result<Quadrilateral, Error> {
     let net = data.to_net(signed);
-    let solved = solve_boundary(&net, options)?;
+    let solved = boundary_of(&net, options, watch)?;
     let curves: [BezierCurve; 4] = std::array::from_fn(|i| solved.curves[i].clone());
     let torsions: [f64; 4] = std::array::from_fn(|c| solved.torsions[c]);
     let inflections = std::array::from_fn(|i| solved.inflections[i].clone());
@@ -202,8 +235,8 @@ pub(crate) fn finish(
     torsions: [f64; 4],
     inflections: [Vec<f64>; 4],
     freedoms: usize,
-    mut warnings: Vec<AsymptoticWarning>,
-) -> Result<Quadrilateral, AsymptoticError> {
+    mut warnings: Vec<Warning>,
+) -> Result<Quadrilateral, Error> {
     let qualities: [CurveQuality; 4] = std::array::from_fn(|i| curves[i].quality());
     for i in 0..4 {
         check_curve(
@@ -218,7 +251,7 @@ pub(crate) fn finish(
             // The families alternate around a face, so a line sees the same family at both ends.
             let [a, b] = CURVE_CORNERS[i];
             if torsions[a] * torsions[b] < 0.0 {
-                warnings.push(AsymptoticWarning::LineTorsionSigns {
+                warnings.push(Warning::LineTorsionSigns {
                     place: Place::PatchCurve(i),
                     start: torsions[a],
                     end: torsions[b],
@@ -231,10 +264,7 @@ pub(crate) fn finish(
     let positive = (0..4).any(|c| known(c) && torsions[c] > 0.0);
     let negative = (0..4).any(|c| known(c) && torsions[c] < 0.0);
     if positive && negative {
-        warnings.push(AsymptoticWarning::CornerTorsionSigns {
-            place: Place::Patch(0),
-            values: torsions,
-        });
+        warnings.push(Warning::CornerTorsionSigns { place: Place::Patch(0), values: torsions });
     }
     Ok(Quadrilateral {
         strain_energy: curves.iter().map(|c| c.derivative_energy(2)).sum(),
@@ -254,11 +284,11 @@ pub(crate) fn check_curve(
     quality: &CurveQuality,
     line: bool,
     inflections: &[f64],
-    warnings: &mut Vec<AsymptoticWarning>,
-) -> Result<(), AsymptoticError> {
+    warnings: &mut Vec<Warning>,
+) -> Result<(), Error> {
     let relative_speed = quality.relative_speed;
     if !(relative_speed > CUSP_TOL) {
-        return Err(AsymptoticError::Cusp { place, relative_speed });
+        return Err(Error::Cusp { place, relative_speed });
     }
     if line {
         return Ok(());
@@ -266,20 +296,20 @@ pub(crate) fn check_curve(
     // Inflections are harmless where they are declared, or the normals are known beforehand.
     if inflections.is_empty() && curve.normals().is_none() {
         if let Some(t) = quality.reversal {
-            return Err(AsymptoticError::UndeclaredInflection { place, t });
+            return Err(Error::UndeclaredInflection { place, t });
         }
         let ratio = quality.curvature[0] / quality.curvature[1];
         if !(ratio >= NEAR_ZERO_CURVATURE) {
-            warnings.push(AsymptoticWarning::NearZeroCurvature { place, ratio });
+            warnings.push(Warning::NearZeroCurvature { place, ratio });
         }
     }
     if !(quality.turning <= TURNING_LIMIT) {
         let degrees = quality.turning.to_degrees();
-        warnings.push(AsymptoticWarning::BinormalTurning { place, degrees });
+        warnings.push(Warning::BinormalTurning { place, degrees });
     }
     let [min, max] = quality.torsion;
     if min < 0.0 && max > 0.0 {
-        warnings.push(AsymptoticWarning::TorsionSignChange { place, min, max });
+        warnings.push(Warning::TorsionSignChange { place, min, max });
     }
     Ok(())
 }

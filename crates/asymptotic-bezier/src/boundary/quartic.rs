@@ -14,7 +14,7 @@ use crate::boundary::quad::{Quadrilateral, finish};
 use crate::curve::bernstein;
 use crate::curve::bezier::BezierCurve;
 use crate::data::corners::{CURVE_CORNERS, CornerData, DATA_DEGREE, INTO_IS_LEFT};
-use crate::error::{AsymptoticError, Place};
+use crate::error::{Error, Place};
 use numerics::{Matrix, affine_space, minimize_quadratic, norm};
 
 /// Sine between the corner planes below which they have no common line.
@@ -27,9 +27,9 @@ const RESIDUAL_TOL: f64 = 1e-8;
 /// Solves the boundary with quartics; the curvatures of `data` are not used.
 ///
 /// # Errors
-/// [`AsymptoticError::QuarticPlanes`], [`AsymptoticError::QuarticInfeasible`], parallel tangents,
+/// [`Error::QuarticPlanes`], [`Error::QuarticInfeasible`], parallel tangents,
 /// inflections, and the faults of the solved curves.
-pub fn solve_quartic_quadrilateral(data: &CornerData) -> Result<Quadrilateral, AsymptoticError> {
+pub fn solve_quartic_quadrilateral(data: &CornerData) -> Result<Quadrilateral, Error> {
     let scale = DATA_DEGREE as f64 / 4.0;
     let arm = |i: usize, e: usize| data.arm(i, e) * scale;
     // Corners with their u-curve and v-curve; the normal is that of counter-clockwise faces.
@@ -39,7 +39,7 @@ pub fn solve_quartic_quadrilateral(data: &CornerData) -> Result<Quadrilateral, A
         let n = arm(p, pe).normalize().cross(arm(q, qe).normalize());
         if !(n.length() > crate::data::corners::MIN_CORNER_SINE) {
             let place = Place::PatchCorner(c);
-            return Err(AsymptoticError::ParallelTangents { place, sine: n.length() });
+            return Err(Error::ParallelTangents { place, sine: n.length() });
         }
         normals[c] = n.normalize() * if c == 0 || c == 3 { 1.0 } else { -1.0 };
     }
@@ -51,7 +51,7 @@ pub fn solve_quartic_quadrilateral(data: &CornerData) -> Result<Quadrilateral, A
         let line = normals[s].cross(normals[t]);
         let sine = line.length();
         if !(sine > PLANE_TOL) {
-            return Err(AsymptoticError::QuarticPlanes { place: Place::PatchCurve(i), sine });
+            return Err(Error::QuarticPlanes { place: Place::PatchCurve(i), sine });
         }
         along[i] = line / sine * (y - x).length();
         let middle = x.midpoint(y);
@@ -89,7 +89,7 @@ pub fn solve_quartic_quadrilateral(data: &CornerData) -> Result<Quadrilateral, A
     }
     let space = affine_space(&matrix, &right, &[1.0; 4], RANK_TOL);
     if !(space.residual <= RESIDUAL_TOL) {
-        return Err(AsymptoticError::QuarticInfeasible { residual: space.residual });
+        return Err(Error::QuarticInfeasible { residual: space.residual });
     }
     let curve = |i: usize, s: f64| {
         let [x, y] = CURVE_CORNERS[i].map(|c| data.corners[c]);
@@ -106,7 +106,7 @@ pub fn solve_quartic_quadrilateral(data: &CornerData) -> Result<Quadrilateral, A
         }
         if curvatures[i][0] * curvatures[i][1] <= 0.0 {
             let place = Place::PatchCurve(i);
-            return Err(AsymptoticError::InflectionParity { place, declared: 0 });
+            return Err(Error::InflectionParity { place, declared: 0 });
         }
     }
     let torsions = corners.map(|[(p, pe), _]| curves[p].jet(pe as f64).torsion());

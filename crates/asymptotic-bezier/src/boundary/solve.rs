@@ -8,20 +8,25 @@
 //! four free parameters of Wang et al. 2019, §3.2, as the corner torsions.
 
 use geom_core::DVec3;
+use gp_solver::{BoundedQp, Problem, QuadraticForm, Status};
 use rayon::prelude::*;
 
+use crate::boundary::curve_energy::{CurveEnergy, CurveShare, torsion_variables};
 use crate::boundary::inflection::InflectedCurve;
-use crate::boundary::normals::net::solve_by_normals;
+use crate::boundary::normals::curves::NormalCurves;
+use crate::boundary::normals::net::{problem as normals_problem, solve_by_normals};
 use crate::boundary::options::{BOUNDARY_DEGREES, BoundaryEnergy, BoundaryOptions, CurveForm};
 use crate::boundary::solved::Boundary;
-use crate::boundary::torsion_energy::TorsionCurve;
+use crate::boundary::torsion_energy::{self, TorsionCurve};
 use crate::curve::bernstein;
 use crate::curve::bezier::BezierCurve;
 use crate::data::corners::{AsymptoticNet, DATA_DEGREE};
 use crate::data::vertex::{
     PLANE_TOL, VertexFrame, arm_signs, bilinear_torsions, curve_families, vertex_frames,
 };
-use crate::error::{AsymptoticError, AsymptoticWarning};
+use crate::error::Error;
+use crate::warning::Warning;
+use crate::watch::{Shape, Watch};
 use numerics::{AffineSpace, Cholesky, Matrix, affine_space, dot};
 
 /// A coefficient of a torsion equation this small, relative to the curve's size, is no coefficient.
@@ -47,102 +52,223 @@ struct CondensedCurve {
 /// the same tangents.
 ///
 /// # Errors
-/// Every hard fault of the data (see [`AsymptoticError`]).
-pub fn solve_boundary(
-    net: &AsymptoticNet,
-    options: &BoundaryOptions,
-) -> Result<Boundary, AsymptoticError> {
-    let [min, max] = BOUNDARY_DEGREES;
-    if !(min..=max).contains(&options.degree) {
-        let degree = options.degree;
-        return Err(AsymptoticError::Degree { what: "boundary", degree, min, max });
-    }
-    let by_normals = match options.form {
+/// Every hard fault of the data (see [`Error`]).
+pub fn solve_boundary(net: &AsymptoticNet, options: &BoundaryOptions) -> Result<Boundary, Error> {
+    boundary_of(net, options, &mut Watch::quiet(&mut ()))
+}
+
+/// Whether the curves of the net are made from normals.
+pub(crate) fn is_by_normals(net: &AsymptoticNet, form: CurveForm) -> bool {
+    match form {
         CurveForm::Normals => true,
         CurveForm::Curvatures => false,
         CurveForm::Auto => {
             net.estimated && net.has_weak_curvature() && curve_families(net).is_some()
         }
-    };
-    if by_normals {
-        return solve_by_normals(net, options);
     }
-    net.check()?;
-    net.check_curvatures()?;
-    let mut net = net.clone();
-    let frames = vertex_frames(&mut net, PLANE_TOL)?;
-    let order = if options.energy == BoundaryEnergy::Jerk { 3 } else { 2 };
-    let gram = bernstein::gram(options.degree, order);
-    let condensed: Vec<CondensedCurve> = (0..net.curves.len())
-        .into_par_iter()
-        .map(|i| condense(&net, &frames, i, options.degree, &gram))
-        .collect();
-    // Lines have no torsion; inflected curves take theirs from the curves they meet.
-    let silent = |i: usize| net.curves[i].line || net.curves[i].inflections > 0;
+}
 
-    let mut bounds: Vec<[f64; 2]> = (0..net.positions.len())
-        .map(|v| options.torsions.get(v).copied().unwrap_or_default().bounds())
-        .collect();
-    let mut warnings = Vec::new();
-    let signs = arm_signs(&net, &frames);
-    pin_torsions(&net, &frames, &condensed, &mut bounds, &mut warnings)?;
-    let mut torsions = solve_torsions(&net, &signs, &condensed, &bounds);
+/// [`solve_boundary`], watched.
+pub(crate) fn boundary_of(
+    net: &AsymptoticNet,
+    options: &BoundaryOptions,
+    watch: &mut Watch<'_, '_>,
+) -> Result<Boundary, Error> {
+    let [min, max] = BOUNDARY_DEGREES;
+    if !(min..=max).contains(&options.degree) {
+        let degree = options.degree;
+        return Err(Error::Degree { what: "boundary", degree, min, max });
+    }
+    if is_by_normals(net, options.form) {
+        return solve_by_normals(net, options, watch);
+    }
+    let condensed = Condensed::new(net, options)?;
+    let Condensed { net, frames, signs, curves, bounds, warnings } = &condensed;
+    watch.check()?;
+    let mut torsions = condensed.torsions(watch, options.energy)?;
     // Where no curve carries the torsion, the twist of the corners estimates it.
-    let bilinear = bilinear_torsions(&net, &signs, &frames);
+    let bilinear = bilinear_torsions(net, signs, frames);
     for (v, frame) in frames.iter().enumerate() {
         let Some(frame) = frame else { continue };
-        if frame.arms.iter().all(|(i, _)| silent(*i)) && bounds[v][0] < bounds[v][1] {
+        let silent = frame.arms.iter().all(|(i, _)| condensed.is_silent(*i));
+        if silent && bounds[v][0] < bounds[v][1] {
             torsions[v] = bilinear[v].clamp(bounds[v][0], bounds[v][1]);
         }
     }
     if options.energy == BoundaryEnergy::Torsion {
-        let curves: Vec<TorsionCurve> = condensed
-            .iter()
-            .enumerate()
-            .filter(|(i, _)| !silent(*i))
-            .map(|(i, c)| TorsionCurve {
-                points: c.points.clone(),
-                ends: net.curves[i].ends,
-                signs: signs[i],
-            })
-            .collect();
-        crate::boundary::torsion_energy::minimize(&curves, &bounds, &mut torsions);
+        torsion_energy::minimize(&condensed.torsion_curves(), bounds, &mut torsions, watch)?;
     }
-    let free = bounds.iter().zip(&frames).filter(|(b, f)| f.is_some() && b[0] < b[1]).count();
+    let free = bounds.iter().zip(frames).filter(|(b, f)| f.is_some() && b[0] < b[1]).count();
 
-    let solved: Vec<Result<(BezierCurve, Vec<f64>), AsymptoticError>> = condensed
-        .par_iter()
-        .enumerate()
-        .map(|(i, c)| {
-            let curve = &net.curves[i];
-            let [s, e] = [0, 1].map(|e| signs[i][e] * torsions[curve.ends[e]]);
-            if !curve.line && curve.inflections > 0 {
-                return inflected(&net, &frames, i, [s, e], options.degree);
-            }
-            let point = |k: usize| c.points[0][k] + c.points[1][k] * s + c.points[2][k] * e;
-            let ends = curve.ends.map(|v| net.positions[v]);
-            let offsets = (0..=options.degree).map(point).collect();
-            Ok((BezierCurve::from_offsets(offsets, ends), Vec::new()))
-        })
-        .collect();
-    let mut curves = Vec::with_capacity(solved.len());
+    let solved = watch.each(curves.len(), |i, _| {
+        let (c, curve) = (&curves[i], &net.curves[i]);
+        let [s, e] = [0, 1].map(|e| signs[i][e] * torsions[curve.ends[e]]);
+        if !curve.line && curve.inflections > 0 {
+            return inflected(net, frames, i, [s, e], options.degree);
+        }
+        let point = |k: usize| c.points[0][k] + c.points[1][k] * s + c.points[2][k] * e;
+        let ends = curve.ends.map(|v| net.positions[v]);
+        let offsets = (0..=options.degree).map(point).collect();
+        Ok((BezierCurve::from_offsets(offsets, ends), Vec::new()))
+    })?;
+    let mut beziers = Vec::with_capacity(solved.len());
     let mut inflections = Vec::with_capacity(solved.len());
     for result in solved {
         let (curve, parameters) = result?;
-        curves.push(curve);
+        beziers.push(curve);
         inflections.push(parameters);
     }
-    let strain_energy = curves.iter().map(|c| c.derivative_energy(2)).sum();
+    let strain_energy = beziers.iter().map(|c| c.derivative_energy(2)).sum();
     Ok(Boundary {
-        curves,
+        curves: beziers,
         torsions,
         strain_energy,
-        freedoms: free + condensed.iter().map(|c| c.freedoms).sum::<usize>(),
-        warnings,
+        freedoms: free + curves.iter().map(|c| c.freedoms).sum::<usize>(),
+        warnings: warnings.clone(),
         inflections,
-        signs,
+        signs: signs.clone(),
         normals: frames.iter().map(|f| f.as_ref().map_or(DVec3::Z, |f| f.normal)).collect(),
     })
+}
+
+/// The problem of the stage, before anything is solved.
+pub(crate) fn boundary_problem(
+    net: &AsymptoticNet,
+    options: &BoundaryOptions,
+) -> Result<Problem<'static>, Error> {
+    if is_by_normals(net, options.form) {
+        let curves = std::sync::Arc::new(NormalCurves::of_net(net)?);
+        return Ok(normals_problem(&curves, &[]));
+    }
+    let condensed = Condensed::new(net, options)?;
+    if options.energy == BoundaryEnergy::Torsion {
+        let (curves, bounds) = (condensed.torsion_curves(), &condensed.bounds);
+        let held: Vec<bool> = bounds.iter().map(|b| b[0] == b[1]).collect();
+        if let Some(problem) = torsion_energy::problem(&curves, bounds.len(), &held) {
+            return Ok(problem);
+        }
+    }
+    Ok(condensed.problem())
+}
+
+/// All curves of a net as functions of the vertex torsions.
+struct Condensed {
+    /// With arms in the tangent planes.
+    net: AsymptoticNet,
+    frames: Vec<Option<VertexFrame>>,
+    signs: Vec<[f64; 2]>,
+    curves: Vec<CondensedCurve>,
+    bounds: Vec<[f64; 2]>,
+    warnings: Vec<Warning>,
+}
+
+impl Condensed {
+    fn new(net: &AsymptoticNet, options: &BoundaryOptions) -> Result<Self, Error> {
+        net.check()?;
+        net.check_curvatures()?;
+        let mut net = net.clone();
+        let frames = vertex_frames(&mut net, PLANE_TOL)?;
+        let order = if options.energy == BoundaryEnergy::Jerk { 3 } else { 2 };
+        let gram = bernstein::gram(options.degree, order);
+        let curves: Vec<CondensedCurve> = (0..net.curves.len())
+            .into_par_iter()
+            .map(|i| condense(&net, &frames, i, options.degree, &gram))
+            .collect();
+        let mut bounds: Vec<[f64; 2]> = (0..net.positions.len())
+            .map(|v| options.torsions.get(v).copied().unwrap_or_default().bounds())
+            .collect();
+        let mut warnings = Vec::new();
+        let signs = arm_signs(&net, &frames);
+        pin_torsions(&net, &frames, &curves, &mut bounds, &mut warnings)?;
+        Ok(Self { net, frames, signs, curves, bounds, warnings })
+    }
+
+    /// Lines have no torsion; inflected curves take theirs from the curves they meet.
+    fn is_silent(&self, i: usize) -> bool {
+        self.net.curves[i].line || self.net.curves[i].inflections > 0
+    }
+
+    fn torsion_curves(&self) -> Vec<TorsionCurve> {
+        let voiced = (0..self.curves.len()).filter(|i| !self.is_silent(*i));
+        let curve = |i: usize| TorsionCurve {
+            points: self.curves[i].points.clone(),
+            ends: self.net.curves[i].ends,
+            signs: self.signs[i],
+        };
+        voiced.map(curve).collect()
+    }
+
+    /// Curves whose energy the torsions decide.
+    fn deciding(&self) -> impl Iterator<Item = usize> + '_ {
+        (0..self.curves.len()).filter(|i| self.net.curves[*i].inflections == 0)
+    }
+
+    /// Minimises the sum of the energies over the torsions within their bounds.
+    fn program(&self) -> BoundedQp {
+        let mut qp = BoundedQp::new(self.bounds.len());
+        for i in self.deciding() {
+            let (c, ends, signs) = (&self.curves[i], self.net.curves[i].ends, self.signs[i]);
+            for e in 0..2 {
+                qp.quadratic(ends[e], ends[e], c.energy[1 + e][1 + e]);
+                qp.linear(ends[e], c.energy[0][1 + e] * signs[e]);
+            }
+            qp.quadratic(ends[0], ends[1], c.energy[1][2] * signs[0] * signs[1]);
+        }
+        for (v, [min, max]) in self.bounds.iter().enumerate() {
+            qp.bounds(v, *min, *max);
+        }
+        qp
+    }
+
+    fn problem(&self) -> Problem<'static> {
+        let (variables, torsions) = torsion_variables(self.bounds.len());
+        let share = |i: usize| {
+            let [s, e] = self.signs[i];
+            let signs = [1.0, s, e];
+            let energy = std::array::from_fn(|a| {
+                std::array::from_fn(|b| signs[a] * signs[b] * self.curves[i].energy[a][b])
+            });
+            CurveShare { ends: self.net.curves[i].ends, energy }
+        };
+        let mut problem = Problem::new(variables);
+        problem.add_energy(CurveEnergy::new(self.deciding().map(share).collect(), torsions));
+        problem
+    }
+
+    /// The torsions of least energy, with what the caller adds.
+    fn torsions(
+        &self,
+        watch: &mut Watch<'_, '_>,
+        energy: BoundaryEnergy,
+    ) -> Result<Vec<f64>, Error> {
+        let start = self.program().solve()?.x;
+        // The energy of the torsion starts from here and is what the caller adds to.
+        if !watch.is_extended() || energy == BoundaryEnergy::Torsion {
+            return Ok(start);
+        }
+        let mut problem = self.problem();
+        let before = Shape::of(&problem);
+        let stage = watch.stage().clone();
+        watch.extend(&stage, &mut problem)?;
+        if Shape::of(&problem) == before {
+            return Ok(start);
+        }
+        let form = QuadraticForm::of(&problem)?;
+        let mut qp = BoundedQp::new(self.bounds.len());
+        form.terms.iter().for_each(|t| _ = qp.term(t));
+        for (v, [min, max]) in self.bounds.iter().enumerate() {
+            let fixed = problem.variables().fixed()[v];
+            let [min, max] = if fixed { [start[v]; 2] } else { [*min, *max] };
+            qp.bounds(v, min, max);
+        }
+        form.equations.into_iter().for_each(|e| _ = qp.equal(e));
+        let solution = qp.solve()?;
+        if solution.status == Status::Infeasible {
+            let (stage, violation) = (stage.name, solution.violation);
+            return Err(Error::Infeasible { stage, violation });
+        }
+        Ok(solution.x)
+    }
 }
 
 /// Curve `i` with its declared inflections, between ends of known torsion.
@@ -152,7 +278,7 @@ fn inflected(
     i: usize,
     torsions: [f64; 2],
     degree: usize,
-) -> Result<(BezierCurve, Vec<f64>), AsymptoticError> {
+) -> Result<(BezierCurve, Vec<f64>), Error> {
     let curve = &net.curves[i];
     let problem = InflectedCurve {
         chord: net.chord(curve),
@@ -167,11 +293,9 @@ fn inflected(
             let curve = BezierCurve::from_offsets(found.curve.offsets().to_vec(), ends);
             Ok((curve.elevated(degree), found.parameters))
         }
-        Err((defect, iterations)) => Err(AsymptoticError::InflectionNotFound {
-            place: net.curve_place(i),
-            defect,
-            iterations,
-        }),
+        Err((defect, iterations)) => {
+            Err(Error::InflectionNotFound { place: net.curve_place(i), defect, iterations })
+        }
     }
 }
 
@@ -310,17 +434,17 @@ fn pin_torsions(
     frames: &[Option<VertexFrame>],
     condensed: &[CondensedCurve],
     bounds: &mut [[f64; 2]],
-    warnings: &mut Vec<AsymptoticWarning>,
-) -> Result<(), AsymptoticError> {
+    warnings: &mut Vec<Warning>,
+) -> Result<(), Error> {
     for (v, frame) in frames.iter().enumerate() {
         let Some(frame) = frame else { continue };
         let place = net.vertex_place(v);
         if !(bounds[v][0] <= bounds[v][1]) {
             let [min, max] = bounds[v];
-            return Err(AsymptoticError::TorsionBounds { place, min, max });
+            return Err(Error::TorsionBounds { place, min, max });
         }
         if frame.odd {
-            warnings.push(AsymptoticWarning::OddValence { place, valence: frame.arms.len() });
+            warnings.push(Warning::OddValence { place, valence: frame.arms.len() });
             bounds[v] = [0.0, 0.0];
         }
         let mut forced: Option<f64> = None;
@@ -333,16 +457,16 @@ fn pin_torsions(
                 let defect = ((tau - other) * lever).abs();
                 let size = net.chord(&net.curves[*curve]).length();
                 if !(defect <= 1e-10 * size) {
-                    return Err(AsymptoticError::TorsionInfeasible { place, defect });
+                    return Err(Error::TorsionInfeasible { place, defect });
                 }
-                let warning = AsymptoticWarning::VacuousTorsion { place };
+                let warning = Warning::VacuousTorsion { place };
                 if forced.is_some() && !warnings.contains(&warning) {
                     warnings.push(warning);
                 }
             }
             if !(bounds[v][0] <= tau && tau <= bounds[v][1]) && other.is_none() {
                 let defect = (tau - tau.clamp(bounds[v][0], bounds[v][1])).abs() * lever.abs();
-                return Err(AsymptoticError::TorsionInfeasible { place, defect });
+                return Err(Error::TorsionInfeasible { place, defect });
             }
             forced.get_or_insert(tau);
         }
@@ -351,29 +475,4 @@ fn pin_torsions(
         }
     }
     Ok(())
-}
-
-/// Minimises the sum of the condensed energies over the torsions within their bounds.
-fn solve_torsions(
-    net: &AsymptoticNet,
-    signs: &[[f64; 2]],
-    condensed: &[CondensedCurve],
-    bounds: &[[f64; 2]],
-) -> Vec<f64> {
-    let n = bounds.len();
-    // Diagonal, off-diagonal (per curve) and gradient in the vertex torsions.
-    let (mut diagonal, mut gradient) = (vec![0.0; n], vec![0.0; n]);
-    let mut couplings = Vec::with_capacity(condensed.len());
-    for (i, c) in condensed.iter().enumerate() {
-        if net.curves[i].inflections > 0 {
-            continue;
-        }
-        let ends = net.curves[i].ends;
-        for e in 0..2 {
-            diagonal[ends[e]] += c.energy[1 + e][1 + e];
-            gradient[ends[e]] += c.energy[0][1 + e] * signs[i][e];
-        }
-        couplings.push((ends[0], ends[1], c.energy[1][2] * signs[i][0] * signs[i][1]));
-    }
-    crate::boundary::torsion_qp::minimize(&diagonal, &couplings, &gradient, bounds)
 }

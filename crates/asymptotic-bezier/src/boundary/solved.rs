@@ -3,7 +3,7 @@
 use geom_core::DVec3;
 
 use crate::curve::bezier::BezierCurve;
-use crate::error::AsymptoticWarning;
+use crate::warning::Warning;
 
 /// Solved boundary curves of a net.
 #[derive(Clone, Debug, PartialEq)]
@@ -17,7 +17,7 @@ pub struct Boundary {
     /// Number of free torsions and further unknowns that the energy decided.
     pub freedoms: usize,
     /// Vacuous equations, odd valences.
-    pub warnings: Vec<AsymptoticWarning>,
+    pub warnings: Vec<Warning>,
     /// Parameters of the declared inflections of each curve.
     pub inflections: Vec<Vec<f64>>,
     pub(crate) signs: Vec<[f64; 2]>,

@@ -3,7 +3,7 @@
 use geom_core::DVec3;
 use serde::{Deserialize, Serialize};
 
-use crate::error::{AsymptoticError, Place};
+use crate::error::{Error, Place};
 
 /// Tangent control points are those of a curve of this degree: `r′ = 5 · arm` whatever the
 /// degree the boundary is solved in.
@@ -249,13 +249,10 @@ impl AsymptoticNet {
     ///
     /// # Errors
     /// The first fault found, by curve.
-    pub fn check(&self) -> Result<(), AsymptoticError> {
+    pub fn check(&self) -> Result<(), Error> {
         for (v, p) in self.positions.iter().enumerate() {
             if !p.is_finite() {
-                return Err(AsymptoticError::NotFinite {
-                    place: self.vertex_place(v),
-                    what: "the position",
-                });
+                return Err(Error::NotFinite { place: self.vertex_place(v), what: "the position" });
             }
         }
         for (i, curve) in self.curves.iter().enumerate() {
@@ -264,28 +261,28 @@ impl AsymptoticNet {
         Ok(())
     }
 
-    fn check_curve(&self, place: Place, curve: &NetCurve) -> Result<(), AsymptoticError> {
+    fn check_curve(&self, place: Place, curve: &NetCurve) -> Result<(), Error> {
         let chord = self.chord(curve);
         let name = ["start", "end"];
         for e in 0..2 {
             if !curve.arms[e].is_finite() {
-                return Err(AsymptoticError::NotFinite { place, what: "a tangent point" });
+                return Err(Error::NotFinite { place, what: "a tangent point" });
             }
             if !curve.curvatures[e].is_finite() {
-                return Err(AsymptoticError::NotFinite { place, what: "a curvature" });
+                return Err(Error::NotFinite { place, what: "a curvature" });
             }
             let length = curve.arms[e].length();
             if length <= 1e-12 * chord.length().max(self.positions[curve.ends[e]].length()) {
-                return Err(AsymptoticError::CoincidentTangent { place, end: name[e], length });
+                return Err(Error::CoincidentTangent { place, end: name[e], length });
             }
             if curve.line {
                 let sine = chord.cross(curve.arms[e]).length() / (chord.length() * length);
                 // Rounded input carries about twelve good digits of direction.
                 if !(sine <= 1e-10) {
-                    return Err(AsymptoticError::LineNotStraight { place, sine });
+                    return Err(Error::LineNotStraight { place, sine });
                 }
                 if curve.curvatures[e] != 0.0 {
-                    return Err(AsymptoticError::LineWithCurvature {
+                    return Err(Error::LineWithCurvature {
                         place,
                         end: name[e],
                         curvature: curve.curvatures[e],
@@ -297,20 +294,20 @@ impl AsymptoticNet {
     }
 
     /// Refuses zero curvatures, and curvatures that contradict the declared inflections.
-    pub(crate) fn check_curvatures(&self) -> Result<(), AsymptoticError> {
+    pub(crate) fn check_curvatures(&self) -> Result<(), Error> {
         for (i, curve) in self.curves.iter().enumerate().filter(|(_, c)| !c.line) {
             let place = self.curve_place(i);
             for e in 0..2 {
                 if curve.curvatures[e] == 0.0 {
                     let end = ["start", "end"][e];
-                    return Err(AsymptoticError::ZeroCurvature { place, end });
+                    return Err(Error::ZeroCurvature { place, end });
                 }
             }
             // At the end the arm runs against the curve, so equal sides have opposite signs.
             let same_side = curve.curvatures[0] * curve.curvatures[1] < 0.0;
             if same_side != curve.inflections.is_multiple_of(2) {
                 let declared = curve.inflections;
-                return Err(AsymptoticError::InflectionParity { place, declared });
+                return Err(Error::InflectionParity { place, declared });
             }
         }
         Ok(())

@@ -5,7 +5,8 @@ use std::collections::HashMap;
 use geom_core::{DVec3, HalfEdgeId, PolyMesh, VertexId};
 
 use crate::data::corners::{AsymptoticNet, DATA_DEGREE, NetCurve, NetFace};
-use crate::error::AsymptoticError;
+use crate::error::Error;
+use crate::faults::NetFault;
 
 /// Most points of a polyline that a stencil for tangent and curvature uses.
 const STENCIL: usize = 5;
@@ -17,30 +18,27 @@ impl AsymptoticNet {
     /// A net of quadrilateral faces (corners counter-clockwise) with one curve along every edge.
     ///
     /// # Errors
-    /// [`AsymptoticError::Net`] when a face has no curve along an edge, a curve bounds more than
+    /// [`Error::Net`] when a face has no curve along an edge, a curve bounds more than
     /// two faces, faces are not consistently oriented, or an index is out of range; then the
     /// faults of [`AsymptoticNet::check`].
     pub fn new(
         positions: Vec<DVec3>,
         quads: &[[usize; 4]],
         curves: Vec<NetCurve>,
-    ) -> Result<Self, AsymptoticError> {
-        let refuse = |message: String| Err(AsymptoticError::Net { message });
+    ) -> Result<Self, Error> {
+        let vertices = positions.len();
         let mut index = HashMap::with_capacity(curves.len());
         for (i, curve) in curves.iter().enumerate() {
             let [a, b] = curve.ends;
             if a >= positions.len() || b >= positions.len() || a == b {
-                return refuse(format!(
-                    "curve {i} joins vertices {a} and {b}, but there are {} vertices; use two different ones",
-                    positions.len()
-                ));
+                return Err(NetFault::Ends { curve: i, a, b, vertices }.into());
             }
             if index.insert((a.min(b), a.max(b)), i).is_some() {
-                return refuse(format!("two curves join vertices {a} and {b}; drop one"));
+                return Err(NetFault::Doubled { a, b }.into());
             }
         }
         if quads.is_empty() {
-            return refuse("no faces; give at least one quad".into());
+            return Err(NetFault::NoFaces.into());
         }
         // Each side of a curve takes one face.
         let mut taken = vec![[None::<usize>; 2]; curves.len()];
@@ -52,17 +50,13 @@ impl AsymptoticNet {
             let sides = [(v00, v10, true), (v00, v01, false), (v01, v11, false), (v10, v11, true)];
             for (k, (a, b, forward)) in sides.into_iter().enumerate() {
                 let Some(&i) = index.get(&(a.min(b), a.max(b))) else {
-                    return refuse(format!(
-                        "face {f} has no curve between vertices {a} and {b}; add it"
-                    ));
+                    return Err(NetFault::NoCurve { face: f, a, b }.into());
                 };
                 face.curves[k] = i;
                 face.reversed[k] = curves[i].ends[0] != a;
                 let side = usize::from(face.reversed[k] == forward);
                 if let Some(g) = taken[i][side].replace(f) {
-                    return refuse(format!(
-                        "faces {g} and {f} lie on the same side of the curve between vertices {a} and {b}; orient all faces alike and let a curve bound at most two"
-                    ));
+                    return Err(NetFault::SameSide { first: g, second: f, a, b }.into());
                 }
             }
             faces.push(face);
@@ -81,19 +75,15 @@ impl AsymptoticNet {
     /// A curve whose curvature changes sign between its ends gets one inflection.
     ///
     /// # Errors
-    /// [`AsymptoticError::Net`] when a face is not a quad, and the faults of
+    /// [`Error::Net`] when a face is not a quad, and the faults of
     /// [`AsymptoticNet::check`].
-    pub fn from_mesh(mesh: &PolyMesh) -> Result<Self, AsymptoticError> {
+    pub fn from_mesh(mesh: &PolyMesh) -> Result<Self, Error> {
         let mut quads = Vec::with_capacity(mesh.face_count());
         for face in mesh.faces() {
             let corners: Vec<usize> = mesh.face_vertices(face).map(VertexId::index).collect();
             let Ok(quad) = <[usize; 4]>::try_from(corners.as_slice()) else {
-                let message = format!(
-                    "face {} has {} corners; an asymptotic net has quads only",
-                    face.index(),
-                    corners.len()
-                );
-                return Err(AsymptoticError::Net { message });
+                let (face, corners) = (face.index(), corners.len());
+                return Err(NetFault::NotQuad { face, corners }.into());
             };
             quads.push(quad);
         }

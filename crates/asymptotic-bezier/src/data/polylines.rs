@@ -7,7 +7,8 @@ use numerics::least_squares;
 
 use crate::data::corners::{AsymptoticNet, NetCurve};
 use crate::data::net::net_curve;
-use crate::error::AsymptoticError;
+use crate::error::Error;
+use crate::faults::NetFault;
 
 /// Ends of polylines this near, relative to the median length, are one vertex.
 const MERGE_TOL: f64 = 1e-6;
@@ -22,29 +23,25 @@ impl AsymptoticNet {
     /// seven where the polyline has twice as many points, fitted by least squares.
     ///
     /// # Errors
-    /// [`AsymptoticError::Net`] when a polyline has fewer than three points, or when rings do not
+    /// [`Error::Net`] when a polyline has fewer than three points, or when rings do not
     /// tell the faces (a curve on none, or on more than two); then the faults of
     /// [`AsymptoticNet::new`].
-    pub fn from_polylines(polylines: &[Vec<DVec3>]) -> Result<Self, AsymptoticError> {
-        let refuse = |message: String| Err(AsymptoticError::Net { message });
+    pub fn from_polylines(polylines: &[Vec<DVec3>]) -> Result<Self, Error> {
         if let Some(i) = polylines.iter().position(|p| p.len() < 3) {
-            return refuse(format!(
-                "polyline {i} has {} points; three are needed for a curvature",
-                polylines[i].len()
-            ));
+            let points = polylines[i].len();
+            return Err(NetFault::ShortPolyline { polyline: i, points }.into());
         }
         if let Some(i) = polylines.iter().position(|p| p.iter().any(|q| !q.is_finite())) {
-            return refuse(format!("polyline {i} has a point that is not finite"));
+            return Err(NetFault::PolylineNotFinite { polyline: i }.into());
         }
         let (positions, ends) = merge_ends(polylines);
-        let quads =
-            rings(positions.len(), &ends).map_err(|message| AsymptoticError::Net { message })?;
+        let quads = rings(positions.len(), &ends)?;
         let mut derivatives = Vec::with_capacity(polylines.len());
         for (i, polyline) in polylines.iter().enumerate() {
             let backwards: Vec<DVec3> = polyline.iter().rev().copied().collect();
             let (Some(start), Some(end)) = (end_derivatives(polyline), end_derivatives(&backwards))
             else {
-                return refuse(format!("polyline {i} repeats its points; drop the repetitions"));
+                return Err(NetFault::RepeatedPoints { polyline: i }.into());
             };
             derivatives.push([start, end]);
         }
@@ -101,7 +98,7 @@ fn merge_ends(polylines: &[Vec<DVec3>]) -> (Vec<DVec3>, Vec<[usize; 2]>) {
 }
 
 /// The closed rings of four curves, oriented alike across every curve.
-fn rings(vertices: usize, ends: &[[usize; 2]]) -> Result<Vec<[usize; 4]>, String> {
+fn rings(vertices: usize, ends: &[[usize; 2]]) -> Result<Vec<[usize; 4]>, NetFault> {
     let mut near: Vec<BTreeSet<usize>> = vec![BTreeSet::new(); vertices];
     for [a, b] in ends {
         near[*a].insert(*b);
@@ -130,10 +127,7 @@ fn rings(vertices: usize, ends: &[[usize; 2]]) -> Result<Vec<[usize; 4]>, String
     }
     for ([a, b], faces) in &of_curve {
         if faces.is_empty() || faces.len() > 2 {
-            return Err(format!(
-                "the polyline between vertices {a} and {b} lies on {} rings of four, so the faces cannot be told; complete the rings, or give vertices, quads and curves in a RON file",
-                faces.len()
-            ));
+            return Err(NetFault::Rings { a: *a, b: *b, rings: faces.len() });
         }
     }
     let mut turned: Vec<Option<bool>> = vec![None; found.len()];
@@ -208,7 +202,7 @@ mod tests {
         directed.sort_unstable();
         directed.dedup();
         assert_eq!(directed.len(), count, "no side is run through twice the same way");
-        let error = rings(9, &ends[..11]).unwrap_err();
+        let error = rings(9, &ends[..11]).unwrap_err().to_string();
         assert!(error.contains("lies on 0 rings of four"), "{error}");
     }
 

@@ -4,7 +4,7 @@
 use geom_core::DVec3;
 
 use crate::data::corners::{AsymptoticNet, MIN_CORNER_SINE};
-use crate::error::AsymptoticError;
+use crate::error::Error;
 
 /// Arms may leave their common plane by this much (0.5 degrees) before they are refused; within
 /// it they are projected.
@@ -31,7 +31,7 @@ pub(crate) struct VertexFrame {
 pub(crate) fn vertex_frames(
     net: &mut AsymptoticNet,
     plane_tol: f64,
-) -> Result<Vec<Option<VertexFrame>>, AsymptoticError> {
+) -> Result<Vec<Option<VertexFrame>>, Error> {
     let families = curve_families(net);
     let mut arms: Vec<Vec<(usize, usize)>> = vec![Vec::new(); net.positions.len()];
     for (i, curve) in net.curves.iter().enumerate() {
@@ -64,7 +64,7 @@ pub(crate) fn vertex_frames(
         for [next, prev] in &corners[v] {
             let n = direction(*next).cross(direction(*prev));
             if !(n.length() > MIN_CORNER_SINE) {
-                return Err(AsymptoticError::ParallelTangents { place, sine: n.length() });
+                return Err(Error::ParallelTangents { place, sine: n.length() });
             }
             normal += n;
         }
@@ -74,7 +74,7 @@ pub(crate) fn vertex_frames(
             normal = fit_normal(&directions, normal);
             let worst = directions.iter().map(|d| d.dot(normal).abs()).fold(0.0, f64::max);
             if !(worst <= plane_tol) {
-                return Err(AsymptoticError::TangentsNotCoplanar {
+                return Err(Error::TangentsNotCoplanar {
                     place,
                     angle_deg: worst.min(1.0).asin().to_degrees(),
                     limit_deg: plane_tol.to_degrees(),

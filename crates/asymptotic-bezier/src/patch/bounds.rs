@@ -88,12 +88,9 @@ impl Strips {
         worst
     }
 
-    /// The minimum of the energy with every transversality at least `theta` of its corner value;
-    /// `None` when that is infeasible.
-    pub(crate) fn minimize(&self, family: &PatchFamily, theta: f64) -> Option<Vec<f64>> {
-        let n = family.gradient.len();
-        let hessian: Vec<f64> = (0..n).flat_map(|i| family.hessian.row(i)).copied().collect();
-        let mut program = DenseQp::new(n, hessian, family.gradient.clone());
+    /// Keeps every transversality at least `theta` of its corner value, in a program whose first
+    /// unknowns are the freedoms.
+    pub(crate) fn bound(&self, family: &PatchFamily, theta: f64, program: &mut DenseQp) {
         for s in &self.samples {
             // The corners themselves are fixed.
             if s.t == 0.0 || s.t == 1.0 {
@@ -101,9 +98,19 @@ impl Strips {
             }
             let (constant, row) = family.field_row(s.curve, s.t, s.across);
             // In units of the corner value all rows are comparable.
-            let row: Vec<f64> = row.iter().map(|a| a / s.corner).collect();
+            let mut row: Vec<f64> = row.iter().map(|a| a / s.corner).collect();
+            row.resize(program.unknowns(), 0.0);
             program.at_least(&row, theta - constant / s.corner);
         }
+    }
+
+    /// The minimum of the energy with every transversality at least `theta` of its corner value;
+    /// `None` when that is infeasible.
+    pub(crate) fn minimize(&self, family: &PatchFamily, theta: f64) -> Option<Vec<f64>> {
+        let n = family.gradient.len();
+        let hessian: Vec<f64> = (0..n).flat_map(|i| family.hessian.row(i)).copied().collect();
+        let mut program = DenseQp::new(n, hessian, family.gradient.clone());
+        self.bound(family, theta, &mut program);
         let solution = program.solve().ok()?;
         (solution.status == Status::Converged).then_some(solution.x)
     }

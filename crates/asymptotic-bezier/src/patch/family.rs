@@ -5,7 +5,7 @@ use geom_core::DVec3;
 
 use crate::boundary::four_curves::PatchBoundary;
 use crate::curve::bernstein::{bernstein, elevate, eval};
-use crate::error::{AsymptoticError, Place};
+use crate::error::{Error, Place};
 use crate::patch::field::{FieldSpace, paper_ansatz, tangent_fields};
 use crate::patch::options::Ansatz;
 use crate::patch::surface::Patch;
@@ -55,7 +55,7 @@ impl PatchFamily {
         n: usize,
         ansatz: Ansatz,
         place: Place,
-    ) -> Result<Self, AsymptoticError> {
+    ) -> Result<Self, Error> {
         let spaces: [FieldSpace; 4] = std::array::from_fn(|i| {
             let curve = &boundary.curves[i];
             match ansatz {
@@ -139,7 +139,7 @@ impl PatchFamily {
     }
 
     /// Tangents and twists at the four corners; each corner alone when the fields allow it.
-    fn solve_corners(&mut self, place: Place) -> Result<(), AsymptoticError> {
+    fn solve_corners(&mut self, place: Place) -> Result<(), Error> {
         let total = self.offsets[4];
         let scale = self.scales();
         let equations = self.corner_equations();
@@ -193,7 +193,7 @@ impl PatchFamily {
             }
         }
         if !(worst <= CORNER_TOL * self.size()) {
-            return Err(AsymptoticError::CornerEquations { place, residual: worst });
+            return Err(Error::CornerEquations { place, residual: worst });
         }
         self.particular = particular;
         self.null = Matrix::zeros(total, null_columns.len());

@@ -3,10 +3,11 @@
 use geom_core::DVec3;
 
 use crate::patch::surface::{BasisTable, Patch};
+use crate::watch::Stop;
 
 /// Number of crossing pairs of triangles, which share no corner, in a triangulation of
-/// `cells × cells × 2` triangles.
-pub(crate) fn self_intersections(patch: &Patch, cells: usize) -> usize {
+/// `cells × cells × 2` triangles. The count means nothing once `stop` is set.
+pub(crate) fn self_intersections(patch: &Patch, cells: usize, stop: &Stop) -> usize {
     let table = BasisTable::uniform(patch.degree(), cells + 1);
     let mut points = Vec::with_capacity((cells + 1) * (cells + 1));
     for iu in 0..=cells {
@@ -15,7 +16,7 @@ pub(crate) fn self_intersections(patch: &Patch, cells: usize) -> usize {
     let mut tree = Tree { cells, points, nodes: Vec::with_capacity(2 * cells * cells) };
     let root = tree.build([0, cells, 0, cells]);
     let mut count = 0;
-    tree.inside(root, &mut count);
+    tree.inside(root, &mut count, stop);
     count
 }
 
@@ -70,33 +71,33 @@ impl Tree {
         self.points[i * (self.cells + 1) + j]
     }
 
-    fn inside(&self, node: usize, count: &mut usize) {
+    fn inside(&self, node: usize, count: &mut usize, stop: &Stop) {
         if let Some([a, b]) = self.nodes[node].children {
-            self.inside(a, count);
-            self.inside(b, count);
-            self.between(a, b, count);
+            self.inside(a, count, stop);
+            self.inside(b, count, stop);
+            self.between(a, b, count, stop);
         }
     }
 
-    fn between(&self, a: usize, b: usize, count: &mut usize) {
+    fn between(&self, a: usize, b: usize, count: &mut usize, stop: &Stop) {
         let (na, nb) = (&self.nodes[a], &self.nodes[b]);
-        if na.low.cmpgt(nb.high).any() || nb.low.cmpgt(na.high).any() {
+        if na.low.cmpgt(nb.high).any() || nb.low.cmpgt(na.high).any() || stop.is_set() {
             return;
         }
         match (na.children, nb.children) {
             (None, None) => *count += self.leaves(na, nb),
             (Some([x, y]), None) => {
-                self.between(x, b, count);
-                self.between(y, b, count);
+                self.between(x, b, count, stop);
+                self.between(y, b, count, stop);
             }
             (None, Some([x, y])) => {
-                self.between(a, x, count);
-                self.between(a, y, count);
+                self.between(a, x, count, stop);
+                self.between(a, y, count, stop);
             }
             (Some(xs), Some(ys)) => {
                 for x in xs {
                     for y in ys {
-                        self.between(x, y, count);
+                        self.between(x, y, count, stop);
                     }
                 }
             }
@@ -167,7 +168,7 @@ mod tests {
             Patch::new(5, (0..36).map(|k| f(at(k / 6), at(k % 6))).collect())
         };
         let saddle = sheet(&|u, v| DVec3::new(u, v, (u - 0.5) * (v - 0.5)));
-        assert_eq!(self_intersections(&saddle, 36), 0);
+        assert_eq!(self_intersections(&saddle, 36, &Stop::default()), 0);
         // The control polygon in u makes a loop, so the cylinder over it crosses itself.
         let loops = [(0.0, 0.0), (3.0, 1.0), (3.0, 3.0), (-2.0, 3.0), (-2.0, 1.0), (1.0, 0.0)];
         let curled = Patch::new(
@@ -179,6 +180,6 @@ mod tests {
                 })
                 .collect(),
         );
-        assert!(self_intersections(&curled, 36) > 30);
+        assert!(self_intersections(&curled, 36, &Stop::default()) > 30);
     }
 }

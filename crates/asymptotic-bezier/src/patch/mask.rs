@@ -4,12 +4,16 @@
 //! system; marching them inwards from the corners, the reverse use of Wang et al. 2019, Remark 4.1,
 //! amplifies errors and folds the patch (their Fig. 4.2b), so it is not offered.
 
+use gp_solver::choices;
+use serde::{Deserialize, Serialize};
+
 use crate::curve::bernstein::gram;
 use crate::patch::surface::Patch;
 use numerics::{Matrix, affine_space, dot};
 
 /// How the inner control points are found.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
 pub enum Interior {
     /// Least thin-plate energy (Wang et al. 2019, Eq. 4.5), together with the tangent fields.
     #[default]
@@ -25,6 +29,15 @@ pub enum Interior {
     /// The discrete Coons patch of Farin and Hansford 1999.
     Coons,
 }
+
+choices!(Interior {
+    ThinPlate = "thin_plate",
+    Harmonic = "harmonic",
+    QuasiHarmonic = "quasi_harmonic",
+    Dirichlet = "dirichlet",
+    Bending = "bending",
+    Coons = "coons",
+});
 
 impl Interior {
     /// Weights of the four edge neighbours and the four corner neighbours, which sum to one.

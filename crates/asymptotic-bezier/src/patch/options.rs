@@ -1,9 +1,13 @@
 //! How a patch is filled: degree, tangent fields, bounds, inner control points.
 
+use gp_solver::choices;
+use serde::{Deserialize, Serialize};
+
 use crate::patch::mask::Interior;
 
 /// Which tangent fields are used.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
 pub enum Ansatz {
     /// All polynomial tangent fields of the degree.
     #[default]
@@ -13,6 +17,8 @@ pub enum Ansatz {
     /// The same fields with the free coefficients of `x` left to the energy.
     PaperFree,
 }
+
+choices!(Ansatz { Module = "module", Paper = "paper", PaperFree = "paper_free" });
 
 /// Settings of the patch solve.
 #[derive(Clone, Debug, PartialEq)]

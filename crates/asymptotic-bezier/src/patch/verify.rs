@@ -3,9 +3,11 @@
 use geom_core::DVec3;
 
 use crate::boundary::four_curves::PatchBoundary;
-use crate::error::{AsymptoticWarning, Place};
+use crate::error::Place;
 use crate::patch::intersect::self_intersections;
 use crate::patch::surface::{BasisTable, Patch};
+use crate::warning::Warning;
+use crate::watch::Stop;
 
 /// Samples along each boundary curve.
 const BOUNDARY_SAMPLES: usize = 201;
@@ -43,6 +45,11 @@ impl PatchCheck {
     /// Measures `patch` against the boundary it was filled from.
     #[must_use]
     pub fn new(patch: &Patch, boundary: &PatchBoundary) -> Self {
+        Self::measured(patch, boundary, &Stop::default())
+    }
+
+    /// The same; the numbers mean nothing once `stop` is set.
+    pub(crate) fn measured(patch: &Patch, boundary: &PatchBoundary, stop: &Stop) -> Self {
         let mut check = Self {
             normal_curvature: 0.0,
             torsion_defect: 0.0,
@@ -52,10 +59,12 @@ impl PatchCheck {
             positive_gauss: 0.0,
             gaussian: [f64::INFINITY, f64::NEG_INFINITY],
             mean: [f64::INFINITY, f64::NEG_INFINITY],
-            self_intersections: self_intersections(patch, INTERSECTION_CELLS),
+            self_intersections: self_intersections(patch, INTERSECTION_CELLS, stop),
         };
-        check.measure_boundary(patch, boundary);
-        check.measure_grid(patch);
+        if !stop.is_set() {
+            check.measure_boundary(patch, boundary);
+            check.measure_grid(patch);
+        }
         check
     }
 
@@ -130,22 +139,22 @@ impl PatchCheck {
 
     /// The warnings these measurements deserve.
     #[must_use]
-    pub fn warnings(&self, place: Place, min_sine: f64) -> Vec<AsymptoticWarning> {
+    pub fn warnings(&self, place: Place, min_sine: f64) -> Vec<Warning> {
         let mut out = Vec::new();
         if self.positive_gauss > 0.0 {
             let percent = 100.0 * self.positive_gauss;
-            out.push(AsymptoticWarning::PositiveGauss { place, percent });
+            out.push(Warning::PositiveGauss { place, percent });
         }
         if self.self_intersections > 0 {
             let pairs = self.self_intersections;
-            out.push(AsymptoticWarning::SelfIntersection { place, pairs });
+            out.push(Warning::SelfIntersection { place, pairs });
         }
         if !(self.normal_step > 0.0) {
             let degrees = self.normal_step.clamp(-1.0, 1.0).acos().to_degrees();
-            out.push(AsymptoticWarning::NormalFlip { place, degrees });
+            out.push(Warning::NormalFlip { place, degrees });
         }
         if !(self.sine >= min_sine) {
-            out.push(AsymptoticWarning::LowSine { place, sine: self.sine });
+            out.push(Warning::LowSine { place, sine: self.sine });
         }
         out
     }

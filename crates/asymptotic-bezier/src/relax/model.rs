@@ -1,20 +1,21 @@
 //! The least-squares problem of the relaxed mode: unknowns, rows and their exact Jacobian.
 
 use geom_core::DVec3;
-use gp_solver::{Elements, Options as SolverOptions, Problem, ResidualBlock, solve};
+use std::sync::Arc;
+
+use gp_solver::{Elements, Group, Problem, ResidualBlock, Variables};
 
 use crate::curve::bernstein::{derivative, eval};
 use crate::data::corners::{AsymptoticNet, DATA_DEGREE};
-use crate::data::vertex::VertexFrame;
+use crate::data::vertex::{VertexFrame, arm_signs, bilinear_torsions, vertex_frames};
+use crate::error::Error;
+use crate::stages::TORSIONS;
 
-/// Unknowns of a vertex: two tilts of its normal, and its torsion times the size of the net's
-/// median curve.
-const PER_VERTEX: usize = 3;
-/// Unknowns of a curve's end: stretch and turn of the arm in the tangent plane, logarithm of the
-/// curvature ratio.
-const PER_END: usize = 3;
-/// Unknowns one curve reads: both vertices, both ends.
-const COLUMNS: usize = 2 * (PER_VERTEX + PER_END);
+/// Arms may leave their common plane by this much (10 degrees) when they are to be moved anyway.
+const PLANE_TOL: f64 = 0.175;
+/// Unknowns one curve reads: of both vertices two tilts and the torsion, of both ends stretch and
+/// turn of the arm and the logarithm of the curvature ratio.
+const COLUMNS: usize = 12;
 /// Parameters per curve at which the torsion is looked at.
 const SAMPLES: usize = 9;
 /// Rows of a curve: moves of both ends, two fourth differences, torsions, their variation, sign.
@@ -30,25 +31,53 @@ const SIGN_SHARE: f64 = 10.0;
 const SIGN_MARGIN: f64 = 0.1;
 
 /// A net whose normals, arms, curvatures and torsions may move.
-pub(crate) struct Model<'a> {
+///
+/// Groups of unknowns: `tilts` (two per vertex, of its normal), `torsions` (one per vertex, times the
+/// length of the net's median curve), `arms` (stretch and turn of the arm in the tangent plane, per
+/// curve end), `curvatures` (logarithm of the ratio to the data, per curve end).
+#[derive(Clone, Debug)]
+pub struct MovableNet {
     /// The net as given.
-    given: &'a AsymptoticNet,
+    given: AsymptoticNet,
     /// Unit normal and two tangents per vertex.
     frames: Vec<[DVec3; 3]>,
+    /// Whether the valence of a vertex is odd.
+    odd: Vec<bool>,
     curves: Vec<Curve>,
     size: f64,
     /// Torsions times size to start from.
-    torsions: Vec<f64>,
-    fixed: Vec<bool>,
-    elements: Elements,
-    /// Weight of the fairness against the moves.
-    pub(crate) weight: f64,
-    /// Divides the determinant of the torsion by the `|r′ × r″|²` of the data instead of the
-    /// curve's own: without the poles at inflections and cusps even wild curves find home.
-    pub(crate) tame: bool,
+    starts: Vec<f64>,
+    variables: Variables,
+    groups: Groups,
+}
+
+/// Where the unknowns are.
+#[derive(Clone, Copy, Debug)]
+struct Groups {
+    tilts: Group,
+    torsions: Group,
+    arms: Group,
+    curvatures: Group,
+}
+
+impl Groups {
+    /// Two tilts, torsion, stretch, turn, curvature at both ends of a curve.
+    fn columns(&self, curve: usize, ends: [usize; 2]) -> [usize; COLUMNS] {
+        let mut out = [0; COLUMNS];
+        for e in 0..2 {
+            let (v, end) = (ends[e], 2 * curve + e);
+            let [a, b] = self.tilts.columns(v);
+            let [stretch, turn] = self.arms.columns(end);
+            let own =
+                [a, b, self.torsions.column(v, 0), stretch, turn, self.curvatures.column(end, 0)];
+            out[6 * e..6 * e + 6].copy_from_slice(&own);
+        }
+        out
+    }
 }
 
 /// One curve that moves.
+#[derive(Clone, Copy, Debug)]
 struct Curve {
     index: usize,
     chord: DVec3,
@@ -83,18 +112,33 @@ struct Shape {
     slopes: [[DVec3; 6]; COLUMNS],
 }
 
-impl<'a> Model<'a> {
+impl MovableNet {
+    /// The net with the torsions that the corners let expect.
+    ///
+    /// # Errors
+    /// The hard faults of the data themselves, which no small move can mend.
+    pub fn new(net: &AsymptoticNet) -> Result<Self, Error> {
+        net.check()?;
+        let mut projected = net.clone();
+        let frames = vertex_frames(&mut projected, PLANE_TOL)?;
+        let torsions = bilinear_torsions(net, &arm_signs(net, &frames), &frames);
+        Ok(Self::started(net, &projected, &frames, &torsions))
+    }
+
     /// `frames` and `torsions` per vertex; `projected` is `given` with its arms in the planes.
-    pub(crate) fn new(
-        given: &'a AsymptoticNet,
+    fn started(
+        given: &AsymptoticNet,
         projected: &AsymptoticNet,
         frames: &[Option<VertexFrame>],
         torsions: &[f64],
     ) -> Self {
         let vertices = given.positions.len();
-        let unknowns = PER_VERTEX * vertices + 2 * PER_END * given.curves.len();
-        // What no element reads stays.
-        let mut fixed = vec![true; unknowns];
+        let mut variables = Variables::new();
+        let [tilts, turning] = variables.interleave(vertices, [("tilts", 2), (TORSIONS, 1)]);
+        let ends = 2 * given.curves.len();
+        let [arms, curvatures] = variables.interleave(ends, [("arms", 2), ("curvatures", 1)]);
+        let groups = Groups { tilts, torsions: turning, arms, curvatures };
+        let mut read = vec![false; variables.len()];
         let mut lengths: Vec<f64> = given.curves.iter().map(|c| given.chord(c).length()).collect();
         lengths.sort_by(f64::total_cmp);
         let size = lengths[lengths.len() / 2];
@@ -109,15 +153,12 @@ impl<'a> Model<'a> {
         // In a net whose families are known everywhere all vertices vote on one sign.
         let coloured = signs.iter().all(|[a, b]| a == b);
         let vote = torsions.iter().sum::<f64>().signum();
-        let mut elements = Elements::new();
         let mut curves = Vec::new();
         for (index, curve) in projected.curves.iter().enumerate() {
             if curve.line {
                 continue;
             }
-            let columns = Self::columns(vertices, index, curve.ends);
-            elements.push(&columns, ROWS);
-            columns.iter().for_each(|c| fixed[*c] = false);
+            groups.columns(index, curve.ends).into_iter().for_each(|c| read[c] = true);
             let along = [0, 1].map(|e| signs[index][e] * torsions[curve.ends[e]]);
             let wanted = if odd(curve.ends[0]) || odd(curve.ends[1]) {
                 0.0
@@ -139,60 +180,57 @@ impl<'a> Model<'a> {
                 }),
             });
         }
+        // What no element reads stays.
+        let unread = (0..read.len()).filter(|k| !read[*k]);
+        unread.for_each(|k| _ = variables.fix_unknown(k));
         for (v, (_, lines)) in bases.iter().enumerate() {
             // A line stays, so the plane may only turn about it.
             for w in 0..(*lines).min(2) {
-                fixed[PER_VERTEX * v + w] = true;
+                variables.fix_unknown(tilts.column(v, w));
             }
             if odd(v) {
-                fixed[PER_VERTEX * v + 2] = true;
+                variables.fix(turning, v);
             }
         }
         let start = (0..vertices).map(|v| if odd(v) { 0.0 } else { torsions[v] * size });
         Self {
-            given,
+            given: given.clone(),
             frames: bases.into_iter().map(|(basis, _)| basis).collect(),
+            odd: frames.iter().map(|f| f.as_ref().is_some_and(|f| f.odd)).collect(),
             curves,
             size,
-            torsions: start.collect(),
-            fixed,
-            elements,
-            weight: 1.0,
-            tame: false,
+            starts: start.collect(),
+            variables,
+            groups,
         }
     }
 
-    fn columns(vertices: usize, curve: usize, ends: [usize; 2]) -> [usize; COLUMNS] {
-        let end = |e: usize| PER_VERTEX * vertices + PER_END * (2 * curve + e);
-        let firsts = [PER_VERTEX * ends[0], end(0), PER_VERTEX * ends[1], end(1)];
-        std::array::from_fn(|k| firsts[k / 3] + k % 3)
+    /// The unknowns; lines stay, and torsions at vertices of odd valence.
+    #[must_use]
+    pub fn variables(&self) -> &Variables {
+        &self.variables
     }
 
-    /// Everything unmoved, with the given torsions.
-    pub(crate) fn start(&self) -> Vec<f64> {
-        let mut x = vec![0.0; self.fixed.len()];
-        for (v, tau) in self.torsions.iter().enumerate() {
-            x[PER_VERTEX * v + 2] = *tau;
+    /// Everything unmoved.
+    #[must_use]
+    pub fn start(&self) -> Vec<f64> {
+        let mut x = vec![0.0; self.variables.len()];
+        for (v, tau) in self.starts.iter().enumerate() {
+            self.groups.torsions.set(&mut x, v, [*tau]);
         }
         x
     }
 
-    /// Levenberg-Marquardt from `x`; returns the number of steps.
-    pub(crate) fn minimize(&self, x: &mut [f64], max_iterations: usize) -> usize {
-        let mut problem = Problem::new(x.len());
-        problem.add(Rows(self));
-        for (k, fixed) in self.fixed.iter().enumerate() {
-            if *fixed {
-                problem.variables_mut().fix_unknown(k);
-            }
-        }
-        let options = SolverOptions {
-            max_iterations,
-            energy_tol: 1e-6,
-            step_tol: 1e-8,
-            ..Default::default()
-        };
-        solve(problem, x, &options).map_or(0, |report| report.iterations)
+    /// Whether the valence of each vertex is odd.
+    pub(crate) fn odd(&self) -> &[bool] {
+        &self.odd
+    }
+
+    /// The problem with this weight of the fairness against the moves.
+    pub(crate) fn problem(self: &Arc<Self>, weight: f64, tame: bool) -> Problem<'static> {
+        let mut problem = Problem::new(self.variables.clone());
+        problem.add(Moves::new(self, weight, tame));
+        problem
     }
 
     /// The moved net and the torsions of its vertices.
@@ -206,14 +244,13 @@ impl<'a> Model<'a> {
                 moved.curvatures[e] = end.curvature;
             }
         }
-        let torsions =
-            (0..self.torsions.len()).map(|v| x[PER_VERTEX * v + 2] / self.size).collect();
-        (net, torsions)
+        let torsion = |v: usize| self.groups.torsions.get::<1>(x, v)[0] / self.size;
+        (net, (0..self.starts.len()).map(torsion).collect())
     }
 
     fn ends(&self, curve: &Curve, x: &[f64]) -> [End; 2] {
         let data = &self.given.curves[curve.index];
-        let columns = Self::columns(self.frames.len(), curve.index, data.ends);
+        let columns = self.groups.columns(curve.index, data.ends);
         [0, 1].map(|e| {
             let at = |k: usize| x[columns[6 * e + k]];
             let [n, t1, t2] = self.frames[data.ends[e]];
@@ -319,13 +356,39 @@ fn polygons(points: &[DVec3; 6]) -> [Vec<DVec3>; 3] {
     [first, second, third]
 }
 
-/// Borrowed rows for the solver.
-struct Rows<'a>(&'a Model<'a>);
+/// Of every curved curve the moves of its end data in percent (arms relative to their length,
+/// logarithms of curvature ratios) and, times the root of the weight, its fairness: fourth
+/// differences of the polygon over the chord, torsion times chord, its change from sample to sample,
+/// and how far it falls short of the sign it should keep. No unit.
+///
+/// The torsion equations (Wang et al. 2019, Eq. 3.2) are solved for the own-arm coefficients, so that
+/// every iterate is an exact asymptotic net; derivatives are exact, moves count from the data.
+#[derive(Clone, Debug)]
+pub struct Moves {
+    model: Arc<MovableNet>,
+    elements: Elements,
+    weight: f64,
+    /// Divides the determinant of the torsion by the `|r′ × r″|²` of the data instead of the
+    /// curve's own: without the poles at inflections and cusps even wild curves find home.
+    tame: bool,
+}
 
-impl Rows<'_> {
+impl Moves {
+    /// The rows of all curves that are not lines, with this weight of the fairness; `tame` replaces
+    /// the poles of the torsion at inflections by its value for the curvatures given.
+    #[must_use]
+    pub fn new(model: &Arc<MovableNet>, weight: f64, tame: bool) -> Self {
+        let mut elements = Elements::new();
+        for curve in &model.curves {
+            let ends = model.given.curves[curve.index].ends;
+            elements.push(&model.groups.columns(curve.index, ends), ROWS);
+        }
+        Self { model: Arc::clone(model), elements, weight, tame }
+    }
+
     /// Residuals of one curve, and their derivatives row by row when wanted.
     fn curve(&self, curve: &Curve, x: &[f64], out: &mut [f64], jacobian: Option<&mut [f64]>) {
-        let model = self.0;
+        let model = &self.model;
         let mut none = [];
         let (jacobian, exact) = match jacobian {
             Some(values) => (values, true),
@@ -355,7 +418,7 @@ impl Rows<'_> {
             put(4 * e + 3, 100.0 * log, &|k| if own(k) == Some(5) { 100.0 } else { 0.0 });
         }
         let length = curve.chord.length();
-        let weight = model.weight.sqrt();
+        let weight = self.weight.sqrt();
         if !curve.fair {
             for row in 8..ROWS {
                 put(row, 0.0, &|_| 0.0);
@@ -373,7 +436,7 @@ impl Rows<'_> {
                 fourth(&shape.slopes[c], k)[axis] * scale
             });
         }
-        let (tau, slopes) = torsions(&shape, length, model.tame.then_some(curve.reference), exact);
+        let (tau, slopes) = torsions(&shape, length, self.tame.then_some(curve.reference), exact);
         let at = 14;
         let gentle = weight * TORSION_SHARE / (SAMPLES as f64).sqrt();
         for j in 0..SAMPLES {
@@ -438,17 +501,17 @@ fn torsions(
     (values, slopes)
 }
 
-impl ResidualBlock for Rows<'_> {
+impl ResidualBlock for Moves {
     fn name(&self) -> &str {
         "relaxed data"
     }
 
     fn elements(&self) -> &Elements {
-        &self.0.elements
+        &self.elements
     }
 
     fn residuals(&self, x: &[f64], residuals: &mut [f64]) {
-        for (curve, out) in self.0.curves.iter().zip(residuals.chunks_exact_mut(ROWS)) {
+        for (curve, out) in self.model.curves.iter().zip(residuals.chunks_exact_mut(ROWS)) {
             self.curve(curve, x, out, None);
         }
     }
@@ -456,7 +519,7 @@ impl ResidualBlock for Rows<'_> {
     fn linearize(&self, x: &[f64], residuals: &mut [f64], jacobian: &mut [f64]) {
         let blocks =
             residuals.chunks_exact_mut(ROWS).zip(jacobian.chunks_exact_mut(ROWS * COLUMNS));
-        for (curve, (out, jacobian)) in self.0.curves.iter().zip(blocks) {
+        for (curve, (out, jacobian)) in self.model.curves.iter().zip(blocks) {
             self.curve(curve, x, out, Some(jacobian));
         }
     }
@@ -465,7 +528,6 @@ impl ResidualBlock for Rows<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::data::vertex::{PLANE_TOL, vertex_frames};
 
     #[test]
     fn jacobian_matches_central_differences() {
@@ -488,17 +550,14 @@ mod tests {
             lines: [false; 4],
             inflections: [0; 4],
         };
-        let given = data.to_net(&[[0.3; 2]; 4]);
-        let mut projected = given.clone();
-        let frames = vertex_frames(&mut projected, PLANE_TOL).unwrap();
-        let mut model = Model::new(&given, &projected, &frames, &[0.3, 0.2, 0.25, 0.35]);
+        let model = Arc::new(MovableNet::new(&data.to_net(&[[0.3; 2]; 4])).unwrap());
         let mut x = model.start();
         for (k, x) in x.iter_mut().enumerate() {
             *x += 0.03 * (1.7 * k as f64).sin();
         }
         for tame in [false, true] {
-            model.tame = tame;
-            let worst = gp_solver::check_jacobian(&Rows(&model), &x).unwrap().unwrap();
+            let rows = Moves::new(&model, 1.0, tame);
+            let worst = gp_solver::check_jacobian(&rows, &x).unwrap().unwrap();
             assert!(worst.error < 1e-6, "{worst:?}");
         }
     }

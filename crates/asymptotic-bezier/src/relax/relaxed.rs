@@ -10,20 +10,22 @@
 //! weight of the fairness is raised from small values until the result is acceptable, so data
 //! that are nearly good are hardly touched. One patch is a net of one face.
 
+use std::sync::Arc;
+
+use gp_solver::Options as SolverOptions;
+
 use crate::boundary::options::{BoundaryOptions, TorsionHandle};
-use crate::boundary::quad::{TURNING_LIMIT, solve_quadrilateral};
-use crate::boundary::solve::solve_boundary;
+use crate::boundary::quad::{TURNING_LIMIT, quadrilateral_of};
+use crate::boundary::solve::boundary_of;
 use crate::boundary::solved::Boundary;
 use crate::data::corners::{AsymptoticNet, CURVE_CORNERS, CornerData, Curvatures, INTO_IS_LEFT};
-use crate::data::vertex::{arm_signs, bilinear_torsions, vertex_frames};
-use crate::error::AsymptoticError;
+use crate::error::Error;
 use crate::patch::options::PatchOptions;
-use crate::relax::model::Model;
+use crate::relax::model::MovableNet;
 use crate::shell::gridshell::fill_solved;
-use crate::shell::joint::Joins;
-
-/// Arms may leave their common plane by this much (10 degrees) when they are to be moved anyway.
-const PLANE_TOL: f64 = 0.175;
+use crate::shell::joins::Joins;
+use crate::stages::RELAXATION;
+use crate::watch::Watch;
 
 /// Fairness weight of the first solve without poles.
 const TAMING_WEIGHT: f64 = 3.0;
@@ -97,57 +99,42 @@ impl Relaxed {
 ///
 /// # Errors
 /// The hard faults of the data themselves, which no small move can mend.
-pub fn relax(net: &AsymptoticNet, options: &RelaxOptions) -> Result<Relaxed, AsymptoticError> {
-    net.check()?;
-    let mut projected = net.clone();
-    let frames = vertex_frames(&mut projected, PLANE_TOL)?;
-    let odd: Vec<bool> = frames.iter().map(|f| f.as_ref().is_some_and(|f| f.odd)).collect();
-    let free = vec![TorsionHandle::Free; frames.len()];
-    let mut best = None;
-    let mut failure = None;
-    let mut try_net = |moved: AsymptoticNet, torsions: Vec<TorsionHandle>, iterations: usize| {
-        let moves = moves(net, &moved);
-        let mut relaxed = Relaxed { net: moved, torsions, moves, acceptable: false, iterations };
-        match judge(&mut relaxed, &odd, options) {
-            Ok(turning) => {
-                let within = relaxed.max_move() <= options.max_move;
-                let acceptable = relaxed.acceptable;
-                if acceptable || within && best.as_ref().is_none_or(|(least, _)| turning < *least) {
-                    best = Some((turning, relaxed));
-                }
-                acceptable
-            }
-            Err(error) => {
-                failure.get_or_insert(error);
-                false
-            }
-        }
-    };
+pub fn relax(net: &AsymptoticNet, options: &RelaxOptions) -> Result<Relaxed, Error> {
+    relaxed_of(net, options, &mut Watch::quiet(&mut ()))
+}
+
+/// [`relax`], watched.
+pub(crate) fn relaxed_of(
+    net: &AsymptoticNet,
+    options: &RelaxOptions,
+    watch: &mut Watch<'_, '_>,
+) -> Result<Relaxed, Error> {
+    let model = Arc::new(MovableNet::new(net)?);
+    watch.enter(RELAXATION, 0);
+    let mut tries = Tries { net, options, model: &model, best: None, failure: None };
     let mut iterations = 0;
-    if !try_net(net.clone(), free, 0) {
-        let start = bilinear_torsions(net, &arm_signs(net, &frames), &frames);
-        let mut model = Model::new(net, &projected, &frames, &start);
+    let free = vec![TorsionHandle::Free; net.positions().len()];
+    // Data that are good already stay, unless the caller adds something to the problem.
+    let good = tries.judge(net.clone(), free, 0, watch)?;
+    if !good || watch.is_extended() {
         // From the data first; where that ends in spikes, from curves that were made fair without
         // the poles of the torsion.
         'start: for tamed in [false, true] {
             let mut x = model.start();
             if tamed {
-                (model.tame, model.weight) = (true, TAMING_WEIGHT);
-                iterations += model.minimize(&mut x, options.max_iterations);
-                model.tame = false;
+                iterations += moved(&model, TAMING_WEIGHT, true, &mut x, options, watch)?;
             }
             for &weight in &options.weights {
-                model.weight = weight;
-                iterations += model.minimize(&mut x, options.max_iterations);
+                iterations += moved(&model, weight, false, &mut x, options, watch)?;
                 let (moved, torsions) = model.unpack(&x);
                 let torsions = torsions.into_iter().map(TorsionHandle::Fixed).collect();
-                if try_net(moved, torsions, iterations) {
+                if tries.judge(moved, torsions, iterations, watch)? {
                     break 'start;
                 }
             }
         }
     }
-    match (best, failure) {
+    match (tries.best, tries.failure) {
         (Some((_, relaxed)), _) => Ok(Relaxed { iterations, ..relaxed }),
         (None, Some(error)) => Err(error),
         (None, None) => Ok(Relaxed {
@@ -160,6 +147,69 @@ pub fn relax(net: &AsymptoticNet, options: &RelaxOptions) -> Result<Relaxed, Asy
     }
 }
 
+/// Levenberg-Marquardt from `x`; returns the number of steps.
+fn moved(
+    model: &Arc<MovableNet>,
+    weight: f64,
+    tame: bool,
+    x: &mut [f64],
+    options: &RelaxOptions,
+    watch: &mut Watch<'_, '_>,
+) -> Result<usize, Error> {
+    let mut problem = model.problem(weight, tame);
+    let stage = watch.stage().clone();
+    watch.extend(&stage, &mut problem)?;
+    let solver = SolverOptions {
+        max_iterations: options.max_iterations,
+        energy_tol: 1e-6,
+        step_tol: 1e-8,
+        ..SolverOptions::default()
+    };
+    watch.improve(problem, x, &solver)
+}
+
+/// The moved nets tried so far.
+struct Tries<'t> {
+    net: &'t AsymptoticNet,
+    options: &'t RelaxOptions,
+    model: &'t MovableNet,
+    /// With its largest turning.
+    best: Option<(f64, Relaxed)>,
+    failure: Option<Error>,
+}
+
+impl Tries<'_> {
+    /// Whether the net is acceptable.
+    fn judge(
+        &mut self,
+        moved: AsymptoticNet,
+        torsions: Vec<TorsionHandle>,
+        iterations: usize,
+        watch: &mut Watch<'_, '_>,
+    ) -> Result<bool, Error> {
+        let moves = moves(self.net, &moved);
+        let mut relaxed = Relaxed { net: moved, torsions, moves, acceptable: false, iterations };
+        let judged =
+            watch.unextended(|watch| judge(&mut relaxed, self.model.odd(), self.options, watch));
+        match judged {
+            Ok(turning) => {
+                let within = relaxed.max_move() <= self.options.max_move;
+                let acceptable = relaxed.acceptable;
+                let better = self.best.as_ref().is_none_or(|(least, _)| turning < *least);
+                if acceptable || within && better {
+                    self.best = Some((turning, relaxed));
+                }
+                Ok(acceptable)
+            }
+            Err(error @ Error::Interrupted { .. }) => Err(error),
+            Err(error) => {
+                self.failure.get_or_insert(error);
+                Ok(false)
+            }
+        }
+    }
+}
+
 /// [`relax`] for the corner data of one patch; the signs of unsigned curvatures are found first.
 ///
 /// # Errors
@@ -167,14 +217,25 @@ pub fn relax(net: &AsymptoticNet, options: &RelaxOptions) -> Result<Relaxed, Asy
 pub fn relax_patch(
     data: &CornerData,
     options: &RelaxOptions,
-) -> Result<(CornerData, Relaxed), AsymptoticError> {
+) -> Result<(CornerData, Relaxed), Error> {
+    relaxed_patch_of(data, options, &mut Watch::quiet(&mut ()))
+}
+
+/// [`relax_patch`], watched.
+pub(crate) fn relaxed_patch_of(
+    data: &CornerData,
+    options: &RelaxOptions,
+    watch: &mut Watch<'_, '_>,
+) -> Result<(CornerData, Relaxed), Error> {
+    watch.enter(RELAXATION, 0);
     let signed = match data.curvatures {
         Curvatures::Signed(k) => k,
         Curvatures::Unsigned(_) => {
-            solve_quadrilateral(data, &BoundaryOptions::default())?.curvatures
+            let default = BoundaryOptions::default();
+            watch.unextended(|watch| quadrilateral_of(data, &default, watch))?.curvatures
         }
     };
-    let relaxed = relax(&data.to_net(&signed), options)?;
+    let relaxed = relaxed_of(&data.to_net(&signed), options, watch)?;
     let mut moved = data.clone();
     let mut k = signed;
     for (i, curve) in relaxed.net.curves().iter().enumerate() {
@@ -196,10 +257,11 @@ fn judge(
     relaxed: &mut Relaxed,
     odd: &[bool],
     options: &RelaxOptions,
-) -> Result<f64, AsymptoticError> {
+    watch: &mut Watch<'_, '_>,
+) -> Result<f64, Error> {
     let net = &relaxed.net;
     let settings = BoundaryOptions { torsions: relaxed.torsions.clone(), ..Default::default() };
-    let boundary: Boundary = solve_boundary(net, &settings)?;
+    let boundary: Boundary = boundary_of(net, &settings, watch)?;
     let qualities: Vec<_> = boundary.curves.iter().map(|c| c.quality()).collect();
     let curved = |i: &usize| !net.curves()[*i].line && net.curves()[*i].inflections == 0;
     let good = (0..qualities.len()).filter(curved).all(|i| {
@@ -211,10 +273,14 @@ fn judge(
     let turning = turning.filter(|t| t.is_finite()).fold(0.0, f64::max);
     let small = relaxed.rms_move() <= options.rms_move && relaxed.max_move() <= options.max_move;
     if good && small {
-        let filled = fill_solved(net, boundary, &PatchOptions::default(), Joins::G1);
-        relaxed.acceptable = filled.is_ok_and(|shell| {
-            shell.patches.iter().all(|p| p.patch.least_sine(32) >= options.min_sine)
-        });
+        relaxed.acceptable =
+            match fill_solved(net, boundary, &PatchOptions::default(), Joins::G1, watch) {
+                Ok(shell) => {
+                    shell.patches.iter().all(|p| p.patch.least_sine(32) >= options.min_sine)
+                }
+                Err(error @ Error::Interrupted { .. }) => return Err(error),
+                Err(_) => false,
+            };
     }
     Ok(turning)
 }

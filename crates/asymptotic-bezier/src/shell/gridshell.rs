@@ -10,17 +10,21 @@ use rayon::prelude::*;
 use crate::boundary::four_curves::PatchBoundary;
 use crate::boundary::options::BoundaryOptions;
 use crate::boundary::quad::check_curve;
-use crate::boundary::solve::solve_boundary;
+use crate::boundary::solve::boundary_of;
 use crate::boundary::solved::Boundary;
 use crate::curve::bezier::CurveQuality;
 use crate::data::corners::AsymptoticNet;
-use crate::error::{AsymptoticError, AsymptoticWarning, Place};
+use crate::error::{Error, Place};
 use crate::patch::mask::Interior;
 use crate::patch::options::{Ansatz, PatchOptions};
-use crate::patch::solve::{FilledPatch, fill_patch};
+use crate::patch::solve::{FilledPatch, extended_patch, fill_patch};
 use crate::patch::surface::{BasisTable, Patch, PatchJet};
 use crate::patch::verify::PatchCheck;
-use crate::shell::joint::{Joins, fill_joint};
+use crate::shell::joins::Joins;
+use crate::shell::joint_solve::fill_joint;
+use crate::stages::{JOINT, PATCH};
+use crate::warning::Warning;
+use crate::watch::Watch;
 
 /// Samples along a shared curve.
 const JOIN_SAMPLES: usize = 41;
@@ -51,7 +55,7 @@ pub struct Gridshell {
     /// Whether the patches at a curve were given a common cross derivative.
     pub continuous: Vec<bool>,
     /// Everything worth a word so far; [`Gridshell::verify`] adds what it finds.
-    pub warnings: Vec<AsymptoticWarning>,
+    pub warnings: Vec<Warning>,
 }
 
 /// What happens across one shared curve.
@@ -77,28 +81,29 @@ pub struct GridshellCheck {
     /// One per curve between two patches.
     pub joins: Vec<JoinCheck>,
     /// Warnings of solve and check together.
-    pub warnings: Vec<AsymptoticWarning>,
+    pub warnings: Vec<Warning>,
 }
 
 /// Solves all curves of `net` at once and fills its faces in parallel.
 ///
 /// # Errors
-/// The first hard fault (see [`AsymptoticError`]), with its curve, vertex or patch.
-pub fn fill_net(
-    net: &AsymptoticNet,
-    options: &GridshellOptions,
-) -> Result<Gridshell, AsymptoticError> {
-    let boundary = solve_boundary(net, &options.boundary)?;
-    fill_solved(net, boundary, &options.patch, options.joins)
+/// The first hard fault (see [`Error`]), with its curve, vertex or patch.
+pub fn fill_net(net: &AsymptoticNet, options: &GridshellOptions) -> Result<Gridshell, Error> {
+    let mut nobody = ();
+    let watch = &mut Watch::quiet(&mut nobody);
+    let boundary = boundary_of(net, &options.boundary, watch)?;
+    fill_solved(net, boundary, &options.patch, options.joins, watch)
 }
 
-/// Fills a net whose curves are solved already.
-pub(crate) fn fill_solved(
-    net: &AsymptoticNet,
-    boundary: Boundary,
-    options: &PatchOptions,
-    joins: Joins,
-) -> Result<Gridshell, AsymptoticError> {
+/// The boundary of every patch of a net, the quality of its curves, and warnings so far.
+pub(crate) struct Outlined {
+    pub(crate) outlines: Vec<PatchBoundary>,
+    qualities: Vec<CurveQuality>,
+    warnings: Vec<Warning>,
+}
+
+/// Checks the solved curves and puts them together face by face.
+pub(crate) fn outlined(net: &AsymptoticNet, boundary: &Boundary) -> Result<Outlined, Error> {
     let inflections = &boundary.inflections;
     let mut warnings = boundary.warnings.clone();
     let qualities: Vec<CurveQuality> =
@@ -108,7 +113,7 @@ pub(crate) fn fill_solved(
         let (place, curve) = (net.curve_place(i), &boundary.curves[i]);
         check_curve(place, curve, quality, line, &inflections[i], &mut warnings)?;
     }
-    let ribbons = line_ribbons(net, &boundary);
+    let ribbons = line_ribbons(net, boundary);
     let outlines: Vec<PatchBoundary> = net
         .faces()
         .iter()
@@ -131,23 +136,65 @@ pub(crate) fn fill_solved(
             }),
         })
         .collect();
+    Ok(Outlined { outlines, qualities, warnings })
+}
+
+/// Fills a net whose curves are solved already.
+pub(crate) fn fill_solved(
+    net: &AsymptoticNet,
+    boundary: Boundary,
+    options: &PatchOptions,
+    joins: Joins,
+    watch: &mut Watch<'_, '_>,
+) -> Result<Gridshell, Error> {
+    let outlined = outlined(net, &boundary)?;
+    let (patches, continuous) =
+        filled_patches(net, &boundary, &outlined.outlines, options, joins, watch)?;
+    Ok(shell_of(boundary, outlined, patches, continuous))
+}
+
+/// Curves and patches put together.
+pub(crate) fn shell_of(
+    boundary: Boundary,
+    outlined: Outlined,
+    patches: Vec<FilledPatch>,
+    continuous: Vec<bool>,
+) -> Gridshell {
+    let Outlined { outlines, qualities, mut warnings } = outlined;
+    warnings.extend(patches.iter().flat_map(|p| p.warnings.iter().cloned()));
+    Gridshell { boundary, qualities, patches, outlines, continuous, warnings }
+}
+
+/// The patches, and which curves got a common cross derivative.
+pub(crate) fn filled_patches(
+    net: &AsymptoticNet,
+    boundary: &Boundary,
+    outlines: &[PatchBoundary],
+    options: &PatchOptions,
+    joins: Joins,
+    watch: &mut Watch<'_, '_>,
+) -> Result<(Vec<FilledPatch>, Vec<bool>), Error> {
     if joins != Joins::G1 {
         if options.ansatz != Ansatz::Module || options.interior != Interior::ThinPlate {
-            return Err(AsymptoticError::JoinsNeedModule);
+            return Err(Error::JoinsNeedModule);
         }
-        let (patches, continuous) = fill_joint(net, &boundary, &outlines, options.degree, joins)?;
-        warnings.extend(patches.iter().flat_map(|p| p.warnings.iter().cloned()));
-        return Ok(Gridshell { boundary, qualities, patches, outlines, continuous, warnings });
+        return fill_joint(net, boundary, outlines, options.degree, joins, watch);
     }
-    let filled: Vec<Result<FilledPatch, AsymptoticError>> = outlines
-        .par_iter()
-        .enumerate()
-        .map(|(f, outline)| fill_patch(outline, options, Place::Patch(f)))
-        .collect();
-    let patches = filled.into_iter().collect::<Result<Vec<FilledPatch>, AsymptoticError>>()?;
-    warnings.extend(patches.iter().flat_map(|p| p.warnings.iter().cloned()));
-    let continuous = vec![false; boundary.curves.len()];
-    Ok(Gridshell { boundary, qualities, patches, outlines, continuous, warnings })
+    let patches: Vec<FilledPatch> = if watch.is_extended() {
+        // One after the other, because the caller's function is one.
+        let each = outlines.iter().enumerate();
+        each.map(|(f, outline)| extended_patch(outline, options, f, watch))
+            .collect::<Result<_, _>>()
+    } else {
+        let fill = |f: usize| fill_patch(&outlines[f], options, Place::Patch(f));
+        watch.each(outlines.len(), |f, _| fill(f))?.into_iter().collect()
+    }?;
+    Ok((patches, vec![false; boundary.curves.len()]))
+}
+
+/// The name of the stage in which patches are filled.
+pub(crate) fn filling(joins: Joins) -> &'static str {
+    if joins == Joins::G1 { PATCH } else { JOINT }
 }
 
 /// Direction fields across the lines that two patches share.
@@ -192,12 +239,31 @@ impl Gridshell {
     /// Measures every patch and every join.
     #[must_use]
     pub fn verify(&self, net: &AsymptoticNet, options: &PatchOptions) -> GridshellCheck {
-        let patches: Vec<PatchCheck> = self
-            .patches
-            .par_iter()
-            .zip(&self.outlines)
-            .map(|(filled, outline)| PatchCheck::new(&filled.patch, outline))
-            .collect();
+        let measured = |k: usize| PatchCheck::new(&self.patches[k].patch, &self.outlines[k]);
+        self.check_of((0..self.patches.len()).into_par_iter().map(measured).collect(), net, options)
+    }
+
+    /// [`verify`](Self::verify), watched.
+    pub(crate) fn verified(
+        &self,
+        net: &AsymptoticNet,
+        options: &PatchOptions,
+        watch: &mut Watch<'_, '_>,
+    ) -> Result<GridshellCheck, Error> {
+        let patches = watch.each(self.patches.len(), |k, stop| {
+            PatchCheck::measured(&self.patches[k].patch, &self.outlines[k], stop)
+        })?;
+        let check = self.check_of(patches, net, options);
+        watch.check()?;
+        Ok(check)
+    }
+
+    fn check_of(
+        &self,
+        patches: Vec<PatchCheck>,
+        net: &AsymptoticNet,
+        options: &PatchOptions,
+    ) -> GridshellCheck {
         let warnings_of =
             |f: usize, check: &PatchCheck| check.warnings(Place::Patch(f), options.min_sine);
         let mut warnings = self.warnings.clone();

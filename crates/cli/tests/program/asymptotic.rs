@@ -45,7 +45,7 @@ fn meshes_along_other_lines_are_refused() {
     let torus = ["asymptotic", "fixtures/quads/torus.obj", "--from-net"];
     refused(&torus, "a.step", &["do not twist", "use a mesh along asymptotic lines"]);
     let rough = ["asymptotic", "fixtures/nets/enneper.obj", "--from-net"];
-    refused(&rough, "a.step", &["net curve", "umbilic hnet"]);
+    refused(&rough, "a.step", &["net curve", "exactly asymptotic"]);
     // Where curves are found nonetheless, their roughness is warned about.
     let warned = metrics(&["fixtures/nets/scherk.obj", "--from-net"]);
     assert_eq!(warned["warnings"], 1);

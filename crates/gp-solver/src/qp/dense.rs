@@ -49,6 +49,12 @@ impl DenseQp {
         Self { n, hessian, linear, equalities: Vec::new(), inequalities: Vec::new() }
     }
 
+    /// Number of unknowns.
+    #[must_use]
+    pub fn unknowns(&self) -> usize {
+        self.n
+    }
+
     /// Adds `a·x = b`.
     ///
     /// # Panics

@@ -1,8 +1,18 @@
-//! Convex quadratic programs.
+//! Convex quadratic programs: dense with any constraints, sparse with bounds, sparse with equalities.
 
+#[cfg(feature = "sparse")]
+mod bounded;
 mod dense;
+mod form;
+#[cfg(feature = "sparse")]
+mod sparse;
 
+#[cfg(feature = "sparse")]
+pub use bounded::BoundedQp;
 pub use dense::DenseQp;
+pub use form::{LinearEquation, QuadraticForm, QuadraticTerm};
+#[cfg(feature = "sparse")]
+pub use sparse::SparseQp;
 
 use crate::report::Status;
 

@@ -2,4 +2,5 @@
 
 pub(crate) mod blocks;
 pub(crate) mod curve;
+pub(crate) mod curves;
 pub(crate) mod net;

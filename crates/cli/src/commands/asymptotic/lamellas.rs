@@ -1,7 +1,6 @@
 //! Drawings and tables of the unrolled strips.
 
-use super::Options;
-use asymptotic_bezier::{Design, Lamella, LamellaOptions, lamellas, strip_layout};
+use asymptotic_bezier::{Lamella, LamellaOptions, Options, Solution, strip_layout};
 use exchange::{Drawing, DrawnLine, Label, LengthUnit};
 use geom_core::DVec3;
 use std::path::{Path, PathBuf};
@@ -9,19 +8,11 @@ use std::path::{Path, PathBuf};
 /// Drawings and tables of the strips.
 pub(super) fn files(
     folder: &Path,
-    result: &Design,
+    result: &Solution,
     options: &Options,
     unit: &LengthUnit,
 ) -> Vec<(PathBuf, Vec<u8>)> {
-    let boundary = &result.shell.boundary;
-    let mut settings = LamellaOptions { width: 1.0, thickness: 0.05, moduli: None };
-    settings.width = options.lamella_width.unwrap_or_else(|| {
-        let strips = lamellas(&result.net, boundary, &settings);
-        strips.iter().map(|l| l.length).fold(0.0, f64::max) / 20.0
-    });
-    settings.thickness = options.lamella_thickness.unwrap_or(settings.width / 20.0);
-    settings.moduli = options.youngs_modulus.zip(options.shear_modulus).map(|(e, g)| [e, g]);
-    let strips = lamellas(&result.net, boundary, &settings);
+    let (settings, strips) = result.lamellas(options);
     let drawing = strip_drawing(&strips, &settings);
     vec![
         (folder.join("lamellas.svg"), exchange::write_svg(&drawing, unit).into_bytes()),

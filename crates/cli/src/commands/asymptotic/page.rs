@@ -6,7 +6,7 @@ use crate::context::Context;
 use crate::failure::Failure;
 use crate::outcome::Outcome;
 use crate::report_support::{add_files, jets::spline_view, new};
-use asymptotic_bezier::{BezierCurve, Design};
+use asymptotic_bezier::{BezierCurve, Solution};
 use exchange::LengthUnit;
 use report::{LineRole, LineSet, Seam, SeamTable};
 
@@ -21,7 +21,7 @@ pub(super) fn add(
     outcome: &mut Outcome,
     args: &ReportArgs,
     context: &Context,
-    result: &Design,
+    result: &Solution,
     unit: LengthUnit,
 ) -> Result<(), Failure> {
     let mut report = new("Asymptotic patches");
@@ -29,7 +29,7 @@ pub(super) fn add(
     let named = surfaces(result)?;
     let all: Vec<_> = named.iter().map(|s| &s.surface).collect();
     let curve = |c: &BezierCurve| c.polyline(SEGMENTS);
-    let lines = result.shell.boundary.curves.iter().map(curve).collect();
+    let lines = result.result.boundary.curves.iter().map(curve).collect();
     let mut curves = LineSet::new("curves", "asymptotic curves", LineRole::Curves, lines);
     curves.visible = true;
     let view = spline_view(STAGE, &all, None, &report.length_unit)?;
@@ -42,13 +42,13 @@ pub(super) fn add(
 }
 
 /// The joins with the largest jumps of the mean curvature.
-fn worst_joins(result: &Design, unit: &LengthUnit) -> SeamTable {
+fn worst_joins(result: &Solution, unit: &LengthUnit) -> SeamTable {
     let joins = &result.check.joins;
     let mut order: Vec<usize> = (0..joins.len()).collect();
     order.sort_by(|&a, &b| joins[b].mean_jump.total_cmp(&joins[a].mean_jump));
     let rows = order.into_iter().take(WORST).map(|k| {
         let join = &joins[k];
-        let curve = &result.shell.boundary.curves[join.curve];
+        let curve = &result.result.boundary.curves[join.curve];
         let [a, b] = result.net.curves()[join.curve].ends;
         Seam {
             label: format!("curve {} from vertex {a} to {b}", join.curve),
@@ -72,7 +72,7 @@ fn worst_joins(result: &Design, unit: &LengthUnit) -> SeamTable {
 }
 
 /// Kinks and jumps of the mean curvature across the shared curves.
-fn kinks(result: &Design) -> Vec<report::Histogram> {
+fn kinks(result: &Solution) -> Vec<report::Histogram> {
     let joins = &result.check.joins;
     if joins.is_empty() {
         return Vec::new();
