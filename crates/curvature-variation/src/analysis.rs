@@ -1,17 +1,14 @@
 //! A subdivision surface measured as it is: curvatures, energies, checks.
 
-use crate::constraints::Constraints;
 use crate::evaluator::EnergyTable;
-use crate::fair::{energies, gauss_bonnet_residual};
 use crate::functional::Functional;
+use crate::metrics::{energies, gauss_bonnet_residual};
 use crate::rules::{Quadrature, gauss_legendre};
 use crate::samples::jet_at;
-use geom_core::{CurvatureStatistics, DVec3, PolyMesh, Torus};
+use geom_core::{CurvatureStatistics, DVec3, PolyMesh};
 use rayon::prelude::*;
-use std::collections::BTreeMap;
 use subdiv_catmull_clark::{
-    Blend, Creases, Patch, SubdivisionError, SubdivisionSurface, limit_frames, refine,
-    refinements_needed,
+    Blend, Creases, Patch, SubdivisionError, SubdivisionSurface, refine, refinements_needed,
 };
 
 /// Gauss points per side of a patch for the mean sizes of curvatures.
@@ -34,14 +31,6 @@ pub struct SurfaceAnalysis {
     pub quadrature_gap: f64,
     /// `|∫K − 2πχ| / ∫|K|`, `None` for an open surface.
     pub gauss_bonnet_residual: Option<f64>,
-}
-
-impl EnergyTable {
-    /// All values under the names of their functionals.
-    #[must_use]
-    pub fn by_name(&self) -> BTreeMap<&'static str, f64> {
-        self.iter().map(|(functional, value)| (functional.name(), value)).collect()
-    }
 }
 
 /// Measures the Catmull-Clark limit surface of a mesh of quads or n-gons.
@@ -80,32 +69,22 @@ pub fn analyze(
         }
     }
     let surface = SubdivisionSurface::with_rings(&mesh, &Creases::none(), blend, blend_rings)?;
-    let free = Constraints::default();
-    let fine = energies(&mesh, &surface, &free, Quadrature::FINE);
-    let normal = energies(&mesh, &surface, &free, Quadrature::NORMAL);
+    let table = |quadrature| {
+        energies(&mesh, &surface, false, quadrature, &mut || false)
+            .unwrap_or_else(EnergyTable::unknown)
+    };
+    let (fine, normal) = (table(Quadrature::FINE), table(Quadrature::NORMAL));
     let gap = [Functional::Bending, Functional::MehlumTarrou { w1: 1.0, w3: 1.0 }]
         .map(|f| (normal.get(f) - fine.get(f)).abs() / fine.get(f).abs().max(f64::MIN_POSITIVE));
-    let residual = gauss_bonnet_residual(&mesh, &surface);
+    let residual = gauss_bonnet_residual(&mesh, &surface, &mut || false);
     Ok(SurfaceAnalysis {
         statistics: statistics(&mesh, &surface),
         energies: fine,
         quadrature_gap: gap[0].max(gap[1]),
-        gauss_bonnet_residual: residual.is_finite().then_some(residual),
+        gauss_bonnet_residual: residual.filter(|r| r.is_finite()),
         mesh,
         surface,
     })
-}
-
-/// The torus nearest to the limit points of a closed surface of genus 1, with the root mean square
-/// of the distances; `None` for any other surface.
-#[must_use]
-pub fn fitted_torus(mesh: &PolyMesh, surface: &SubdivisionSurface) -> Option<(Torus, f64)> {
-    if mesh.euler_characteristic() != 0 || !mesh.boundary_loops().is_empty() {
-        return None;
-    }
-    let frames = limit_frames(mesh, surface);
-    let points: Vec<DVec3> = frames.iter().flatten().map(|f| f.point(mesh.positions())).collect();
-    Torus::fit(&points)
 }
 
 fn statistics(mesh: &PolyMesh, surface: &SubdivisionSurface) -> CurvatureStatistics {

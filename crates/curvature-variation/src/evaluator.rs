@@ -7,6 +7,7 @@ use crate::kernel::{GRADIENT_LEN, PatchRun, Task};
 use crate::rules::{Quadrature, SeparableRule, Table};
 use pulp::Arch;
 use rayon::prelude::*;
+use std::collections::BTreeMap;
 use std::sync::Arc;
 use subdiv_catmull_clark::{BasisId, SubdivisionSurface};
 
@@ -95,9 +96,20 @@ impl EnergyTable {
         energy.combine(|functional| self.get(functional))
     }
 
+    /// Nothing has been computed: all values are NaN.
+    pub(crate) fn unknown() -> Self {
+        Self { values: Functional::ALL.map(|f| (f, f64::NAN)).to_vec() }
+    }
+
     /// All functionals in the order of [`Functional::ALL`].
     pub fn iter(&self) -> impl Iterator<Item = (Functional, f64)> + '_ {
         self.values.iter().copied()
+    }
+
+    /// All values under the names of their functionals.
+    #[must_use]
+    pub fn by_name(&self) -> BTreeMap<&'static str, f64> {
+        self.iter().map(|(functional, value)| (functional.name(), value)).collect()
     }
 }
 
@@ -302,6 +314,31 @@ impl SurfaceEnergy {
         c * area + self.pass(positions, Task::Energy(&density), work)[1]
     }
 
+    /// As [`Self::energy`], of an energy given by its coefficients, with the regularisation of
+    /// [`Functional::Sqrt`] relative to the area `epsilon_area`: to the bit what
+    /// [`Self::gradient_of`] returns.
+    pub(crate) fn energy_of(
+        &self,
+        coefficients: Coefficients,
+        positions: &[f64],
+        epsilon_area: f64,
+        work: &mut Workspace,
+    ) -> f64 {
+        let Coefficients { area: c, mut plain, scaled } = coefficients;
+        fix_epsilon(&mut plain, epsilon_area);
+        if plain.is_zero() {
+            let [area, integral] = self.pass(positions, Task::Energy(&scaled), work);
+            c * area + area * integral
+        } else if scaled.is_zero() {
+            let [area, integral] = self.pass(positions, Task::Energy(&plain), work);
+            c * area + integral
+        } else {
+            let area = self.area(positions, work);
+            let density = plain.plus(area, &scaled);
+            c * area + self.pass(positions, Task::Energy(&density), work)[1]
+        }
+    }
+
     /// The energy and its gradient by the control points' coordinates.
     ///
     /// The regularisation of [`Functional::Sqrt`] is taken relative to the area and held fixed
@@ -360,6 +397,16 @@ impl SurfaceEnergy {
     /// All functionals at once.
     #[must_use]
     pub fn table(&self, positions: &[f64], work: &mut Workspace) -> EnergyTable {
+        self.table_until(positions, work, &mut || false).unwrap_or_else(EnergyTable::unknown)
+    }
+
+    /// As [`Self::table`]; `None` once `stop` says so between two functionals.
+    pub(crate) fn table_until(
+        &self,
+        positions: &[f64],
+        work: &mut Workspace,
+        stop: &mut dyn FnMut() -> bool,
+    ) -> Option<EnergyTable> {
         let area = self.area(positions, work);
         let value = |functional: Functional, work: &mut Workspace| {
             if functional == Functional::Area {
@@ -370,8 +417,14 @@ impl SurfaceEnergy {
             let [_, integral] = self.pass(positions, Task::Energy(&density), work);
             if scaled { area * integral } else { integral }
         };
-        let values = Functional::ALL.map(|f| (f, value(f, work))).to_vec();
-        EnergyTable { values }
+        let mut values = Vec::with_capacity(Functional::ALL.len());
+        for functional in Functional::ALL {
+            if stop() {
+                return None;
+            }
+            values.push((functional, value(functional, work)));
+        }
+        Some(EnergyTable { values })
     }
 
     /// `∫ |K| dA`, the scale a Gauss-Bonnet residual is compared with.

@@ -55,6 +55,30 @@ impl Freedom {
         this
     }
 
+    /// Unknowns of single coordinates: `fixed` has three for every vertex. No symmetry is kept.
+    pub(crate) fn of_coordinates(positions: &[DVec3], fixed: &[bool]) -> Self {
+        let n = positions.len();
+        let mut this = Self {
+            base: positions.to_vec(),
+            start: vec![0; n],
+            dim: vec![0; n],
+            frame: vec![DMat3::IDENTITY; n],
+            copies: Vec::new(),
+        };
+        for v in 0..n {
+            this.start[v] = this.copies.len() as u32;
+            let mut dim = 0;
+            for c in (0..3).filter(|c| !fixed[3 * v + c]) {
+                *this.frame[v].col_mut(dim) = DMat3::IDENTITY.col(c);
+                this.base[v][c] = 0.0;
+                dim += 1;
+            }
+            this.dim[v] = dim as u8;
+            this.copies.extend(std::iter::repeat_n(1.0, dim));
+        }
+        this
+    }
+
     /// Number of unknowns.
     pub(crate) fn len(&self) -> usize {
         self.copies.len()

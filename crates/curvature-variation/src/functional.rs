@@ -137,8 +137,8 @@ impl fmt::Display for Functional {
     }
 }
 
-/// A weighted sum of functionals.
-#[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
+/// A weighted sum of functionals; a text such as `0.92*bending + 0.08*mehlum_tarrou` in files.
+#[derive(Clone, Debug, PartialEq)]
 pub struct Energy {
     /// Weight and functional of every term.
     pub terms: Vec<(f64, Functional)>,

@@ -246,7 +246,7 @@ impl Case {
 
     fn group(&self, symmetric: bool) -> SymmetryGroup {
         if symmetric {
-            SymmetryGroup::detect(&self.mesh)
+            SymmetryGroup::detect(&self.mesh, &mut || false)
         } else {
             SymmetryGroup::trivial(&self.mesh)
         }
@@ -402,7 +402,8 @@ fn gauss_newton_products_match_dual_numbers() {
             fixed[0] = !symmetric;
             let Unknowns { freedom, y, x, evaluator } =
                 case.unknowns(symmetric, &fixed, Quadrature::COARSE);
-            let metric = MetricAssembly::new(&case.surface, &evaluator, &freedom, &[]).unwrap();
+            let metric =
+                MetricAssembly::new(&case.surface, &evaluator, &freedom, &[], None).unwrap();
             let area = evaluator.area(&x, &mut Workspace::default());
             let moved = |seed: f64| {
                 let dy = direction(y.len(), seed);
@@ -421,7 +422,9 @@ fn gauss_newton_products_match_dual_numbers() {
                 coefficients.plain.root_epsilon = ROOT_EPSILON / area;
                 let density = coefficients.plain.plus(area, &coefficients.scaled);
                 let mixture = Mixture { density, gauss_newton: true, sobolev: 0.0 };
-                let values = metric.assemble(&evaluator, &freedom, &x, area, &mixture);
+                let values = metric
+                    .assemble(&evaluator, &freedom, &x, area, &mixture, &mut || false)
+                    .unwrap();
                 let image = metric.multiply(&values, &q);
                 let got: f64 = p.iter().zip(&image).map(|(p, i)| p * i).sum();
                 // 2 Σ c w (∂_p √J f)(∂_q √J f), with the coefficients of the residuals frozen.

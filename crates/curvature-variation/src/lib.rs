@@ -1,62 +1,79 @@
 //! Minimises bending and curvature-variation energies of subdivision surfaces of any topology
 //! (Joshi 2008).
 //!
-//! [`SurfaceEnergy`] integrates [`Functional`]s over a Catmull-Clark surface with exact gradients;
-//! [`fair`] minimises a weighted sum of them, from a coarse control mesh to finer ones. The
-//! densities are written in an orthonormal tangent frame without angles, so that they are smooth
-//! wherever the surface is regular (umbilics are guarded, see [`Functional::Mvs`]).
+//! [`solve`] minimises a weighted sum of [`Functional`]s over a Catmull-Clark surface, from a coarse
+//! control mesh to finer ones; [`SurfaceEnergy`] integrates them with exact gradients. The densities
+//! are written in an orthonormal tangent frame without angles, so that they are smooth wherever the
+//! surface is regular (umbilics are guarded, see [`Functional::Mvs`]). The terms are public as
+//! [`blocks`], and [`solve_with`] takes further ones.
 //!
 //! ```
-//! use curvature_variation::{Constraints, Energy, FairOptions, fair};
-//! use std::ops::ControlFlow;
-//! use subdiv_catmull_clark::Creases;
+//! use curvature_variation::{Input, Options, solve};
 //!
-//! let mesh = fixtures::quad_graphs::torus(10, 8, 1.0, 0.5);
-//! let options = FairOptions { energy: "bending".parse()?, levels: 0, ..FairOptions::default() };
-//! let result = fair(&mesh, &Creases::none(), &Constraints::default(), &options, |_| {
-//!     ControlFlow::Continue(())
-//! })?;
+//! let torus = Input::from(fixtures::quad_graphs::torus(10, 8, 1.0, 0.5));
+//! let options = Options { energy: "bending".parse()?, levels: 0, ..Options::default() };
+//! let solution = solve(&torus, &options, &mut ())?;
 //! // The Clifford torus has bending energy 8 π².
-//! assert!((result.report.energy_final - 78.957).abs() < 0.5);
+//! assert!((solution.metrics.energy_final - 78.957).abs() < 0.5);
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
 mod analysis;
+pub mod blocks;
+mod checkpoint;
 mod constraints;
 mod density;
 mod descent;
 mod discrete;
 mod element;
+mod error;
 mod evaluator;
 mod expression;
-mod fair;
 mod family;
 mod freedom;
 mod functional;
+mod grounds;
 mod guide_block;
 mod guides;
 #[cfg(test)]
 mod independent;
+mod input;
 mod kernel;
+mod level;
+mod limits;
 mod metric;
+mod metrics;
+mod options;
 mod rules;
 mod samples;
+mod schedule;
+mod solution;
+mod solve;
 mod splines;
+mod status;
+mod surface_matrix;
 mod symmetry;
+mod torus;
 mod umbilics;
+mod variables;
 
-pub use analysis::{SurfaceAnalysis, analyze, fitted_torus};
+pub use analysis::{SurfaceAnalysis, analyze};
 pub use constraints::Constraints;
-pub use descent::Method;
 pub use discrete::discrete_bending;
+pub use error::Error;
 pub use evaluator::{EnergyTable, SurfaceEnergy, Workspace};
 pub use expression::ExpressionError;
-pub use fair::{
-    FairError, FairOptions, FairProgress, FairReport, Fairing, LevelReport, SymmetryMode, fair,
-};
-pub use family::fair_in_family;
+pub use family::SHARES;
 pub use functional::{Energy, Functional};
+pub use input::Input;
+pub use level::LevelNumbers;
+pub use metrics::{Metrics, Warning};
+pub use options::{BlendKind, Method, Options, Rings, Symmetry};
 pub use rules::Quadrature;
 pub use samples::SurfaceSamples;
+pub use solution::Solution;
+pub use solve::{problem, solve, solve_with};
 pub use splines::{SplinePatchError, SplinePatches, spline_patches};
+pub use torus::fitted_torus;
 pub use umbilics::Umbilic;
+pub use variables::{CONTROL_POINTS, variables};

@@ -1,30 +1,19 @@
 //! Metrics for the descent: the Gauss-Newton Hessian and a Sobolev norm, assembled and factored.
 
-use crate::constraints::Pull;
-use crate::element::{ElementMatrix, Mixture, element_width};
+use crate::element::Mixture;
 use crate::evaluator::SurfaceEnergy;
 use crate::freedom::Freedom;
-use crate::guide_block::{GuideBlock, is_guided};
-use crate::rules::{Quadrature, Table};
-use gp_solver::{SolverError, SparseCholesky, SymmetricPattern};
-use rayon::prelude::*;
+use crate::limits::Pull;
+use crate::surface_matrix::{Matrix, Stop, SurfaceMatrix};
+use gp_solver::{Problem, SolverError, SparseCholesky, SymmetricPattern};
 use subdiv_catmull_clark::SubdivisionSurface;
-
-/// Gauss points per side the metrics use: they need not be exact.
-const NODES: Quadrature = Quadrature { regular: 4, extraordinary: 8 };
-/// Element matrices computed at a time before they are added up.
-const BATCH: usize = 64;
-/// Area elements below this share of the mean are raised to it.
-const LEAST_AREA: f64 = 1e-3;
 
 /// A metric on the unknowns, with the structure of its matrix worked out once.
 ///
 /// The unknowns of a vertex form a block, and all columns of a block have the same rows, so that
 /// the structure is kept by blocks, in the order in which they are eliminated.
 pub(crate) struct MetricAssembly {
-    // The bases at the nodes of the metrics.
-    rules: Vec<Table>,
-    blocks: Vec<GuideBlock>,
+    surface: SurfaceMatrix,
     cholesky: SparseCholesky,
     // Where every unknown comes in the order of elimination.
     place: Vec<u32>,
@@ -45,18 +34,10 @@ impl MetricAssembly {
         evaluator: &SurfaceEnergy,
         freedom: &Freedom,
         pulls: &[Pull],
+        extra: Option<&Problem<'_>>,
     ) -> Result<Self, SolverError> {
-        let rules = evaluator
-            .groups()
-            .par_iter()
-            .map(|group| {
-                let nodes = NODES.nodes(surface, group.basis);
-                Table::new(surface, group.basis, nodes)
-            })
-            .collect();
-        let blocks = GuideBlock::all(evaluator);
-        let cliques = Cliques { evaluator, blocks: &blocks };
-        let (pattern, place) = eliminated_pattern(&cliques, freedom, pulls)?;
+        let surface = SurfaceMatrix::new(surface, evaluator);
+        let (pattern, place) = eliminated_pattern(&surface, evaluator, freedom, pulls, extra)?;
         let pulls = pull_entries(freedom, pulls)
             .into_iter()
             .map(|((i, j), value)| {
@@ -65,13 +46,13 @@ impl MetricAssembly {
             })
             .collect();
         let mut offsets = Vec::new();
-        for_pairs(&cliques, freedom, &place, |a, b| {
+        for_pairs(surface.cliques(evaluator), freedom, &place, |a, b| {
             let slot = pattern.slot(a, b).unwrap_or(0);
             offsets.push((slot - pattern.column_starts()[b]) as u32);
         });
         offsets.shrink_to_fit();
         let cholesky = SparseCholesky::in_given_order(pattern)?;
-        Ok(Self { rules, blocks, cholesky, place, offsets, pulls })
+        Ok(Self { surface, cholesky, place, offsets, pulls })
     }
 
     /// Number of stored values of the factor.
@@ -89,7 +70,7 @@ impl MetricAssembly {
         self.place.iter().map(|&p| image[p as usize]).collect()
     }
 
-    /// Assembles and factors the metric at `positions`.
+    /// Assembles and factors the metric at `positions`; false if it was stopped before the end.
     ///
     /// # Errors
     /// [`SolverError::NotPositiveDefinite`].
@@ -100,8 +81,14 @@ impl MetricAssembly {
         positions: &[f64],
         area: f64,
         mixture: &Mixture,
-    ) -> Result<(), SolverError> {
-        let mut values = self.assemble(evaluator, freedom, positions, area, mixture);
+        extra: Option<&Problem<'_>>,
+        stop: Stop<'_>,
+    ) -> Result<bool, SolverError> {
+        let assembled = self.assemble(evaluator, freedom, positions, area, mixture, stop);
+        let Some(mut values) = assembled else { return Ok(false) };
+        if let Some(extra) = extra {
+            self.add_extra(extra, freedom, positions, &mut values);
+        }
         // Keeps unknowns that nothing sees from making the matrix singular.
         let starts = self.cholesky.pattern().column_starts();
         let size = freedom.len();
@@ -109,10 +96,14 @@ impl MetricAssembly {
         for j in 0..size {
             values[starts[j]] += 1e-12 * trace / size as f64;
         }
-        self.cholesky.factor(&values)
+        if stop() {
+            return Ok(false);
+        }
+        self.cholesky.factor(&values)?;
+        Ok(true)
     }
 
-    /// The values of the matrix.
+    /// The values of the matrix; `None` if it was stopped before the end.
     pub(crate) fn assemble(
         &self,
         evaluator: &SurfaceEnergy,
@@ -120,60 +111,48 @@ impl MetricAssembly {
         positions: &[f64],
         area: f64,
         mixture: &Mixture,
-    ) -> Vec<f64> {
+        stop: Stop<'_>,
+    ) -> Option<Vec<f64>> {
         let mut values = vec![0.0; self.cholesky.pattern().len()];
         let mut next_pair = 0;
-        let mean_area = area / evaluator.weighted_patches();
-        let mut points = Vec::new();
-        evaluator.guides().extend(positions, &mut points);
-        let positions = &points[..];
-        let element = |group: usize, controls: &[u32], matrix: &mut [f64]| {
-            evaluator.arch().dispatch(ElementMatrix {
-                rule: &self.rules[group],
-                mixture,
-                positions,
-                controls,
-                area,
-                least_area: LEAST_AREA * mean_area,
-                matrix,
-            });
+        let add = &mut |matrix: &Matrix<'_>| {
+            next_pair = self.scatter(matrix, freedom, next_pair, &mut values);
         };
-        for (g, group) in evaluator.groups().iter().enumerate() {
-            if is_guided(evaluator, group) {
-                continue;
-            }
-            let width = element_width(group.per_patch);
-            for controls in group.controls.chunks(BATCH * group.per_patch) {
-                let mut matrices = vec![0.0; controls.len() / group.per_patch * width * width];
-                matrices
-                    .par_chunks_mut(width * width)
-                    .zip(controls.par_chunks(group.per_patch))
-                    .for_each(|(matrix, controls)| element(g, controls, matrix));
-                for (matrix, controls) in
-                    matrices.chunks(width * width).zip(controls.chunks(group.per_patch))
-                {
-                    next_pair = self.scatter(
-                        matrix,
-                        width,
-                        controls,
-                        group.multiplicity,
-                        freedom,
-                        next_pair,
-                        &mut values,
-                    );
-                }
-            }
-        }
-        for block in &self.blocks {
-            let matrix = block.matrix(evaluator, element);
-            let width = 3 * block.vertices.len();
-            next_pair =
-                self.scatter(&matrix, width, &block.vertices, 1.0, freedom, next_pair, &mut values);
-        }
+        self.surface.visit(evaluator, positions, area, mixture, stop, add)?;
         for &(slot, value) in &self.pulls {
             values[slot as usize] += value;
         }
-        values
+        Some(values)
+    }
+
+    /// Adds `Bᵀ H B`, `H` the Hessians of further blocks and `B` how control points depend on the
+    /// unknowns.
+    fn add_extra(
+        &self,
+        extra: &Problem<'_>,
+        freedom: &Freedom,
+        positions: &[f64],
+        values: &mut [f64],
+    ) {
+        let pattern = self.cholesky.pattern();
+        extra.quadratic_models(positions, &mut |columns, _, hessian| {
+            for (k, &column) in columns.iter().enumerate() {
+                for (i, a) in unknowns_of(freedom, column) {
+                    let row = self.place[i] as usize;
+                    for (l, &other) in columns.iter().enumerate() {
+                        let h = hessian[k * columns.len() + l];
+                        for (j, b) in unknowns_of(freedom, other) {
+                            let column = self.place[j] as usize;
+                            if row >= column
+                                && let Some(slot) = pattern.slot(row, column)
+                            {
+                                values[slot] += a * b * h;
+                            }
+                        }
+                    }
+                }
+            }
+        });
     }
 
     pub(crate) fn solve_in_place(&self, rhs: &mut [f64]) {
@@ -185,10 +164,7 @@ impl MetricAssembly {
 
     fn scatter(
         &self,
-        matrix: &[f64],
-        width: usize,
-        controls: &[u32],
-        factor: f64,
+        &Matrix { values: matrix, width, controls, factor }: &Matrix<'_>,
         freedom: &Freedom,
         mut next_pair: usize,
         values: &mut [f64],
@@ -242,9 +218,11 @@ impl MetricAssembly {
 
 /// Structure of the matrix with the unknowns in the order of elimination, and where each comes.
 fn eliminated_pattern(
-    cliques: &Cliques<'_>,
+    surface: &SurfaceMatrix,
+    evaluator: &SurfaceEnergy,
     freedom: &Freedom,
     pulls: &[Pull],
+    extra: Option<&Problem<'_>>,
 ) -> Result<(SymmetricPattern, Vec<u32>), SolverError> {
     let (block_of, blocks) = freedom.blocks();
     let clique = |controls: &mut dyn Iterator<Item = u32>| -> Vec<u32> {
@@ -254,9 +232,11 @@ fn eliminated_pattern(
         met.dedup();
         met
     };
-    let coupled = cliques.iter().map(|controls| clique(&mut controls.iter().copied()));
+    let coupled = surface.cliques(evaluator).map(|controls| clique(&mut controls.iter().copied()));
     let pulled = pulls.iter().map(|p| clique(&mut p.stencil.iter().map(|&(v, _)| v)));
-    let coarse = SymmetricPattern::from_cliques(blocks.len(), coupled.chain(pulled));
+    let added = extra.into_iter().flat_map(Problem::elements);
+    let added = added.map(|columns| clique(&mut columns.iter().map(|&c| (c / 3) as u32)));
+    let coarse = SymmetricPattern::from_cliques(blocks.len(), coupled.chain(pulled).chain(added));
     let mut place = vec![0; freedom.len()];
     let mut next = 0;
     for block in SparseCholesky::elimination_order(&coarse)? {
@@ -283,8 +263,8 @@ fn eliminated_pattern(
 
 // Ordered pairs of control points that have unknowns, the first one's not eliminated before the
 // second one's: the places of their first unknowns.
-fn for_pairs(
-    cliques: &Cliques<'_>,
+fn for_pairs<'a>(
+    cliques: impl Iterator<Item = &'a [u32]>,
     freedom: &Freedom,
     place: &[u32],
     mut visit: impl FnMut(usize, usize),
@@ -293,7 +273,7 @@ fn for_pairs(
         let v = v as usize;
         (freedom.dim[v] > 0).then(|| place[freedom.start[v] as usize] as usize)
     };
-    for controls in cliques.iter() {
+    for controls in cliques {
         for a in controls.iter().filter_map(|&a| first(a)) {
             for b in controls.iter().filter_map(|&b| first(b)) {
                 if a >= b {
@@ -301,22 +281,6 @@ fn for_pairs(
                 }
             }
         }
-    }
-}
-
-/// Sets of control points of which all depend on one another, in the order of assembly: those of
-/// the patches, then those of wide blends.
-struct Cliques<'a> {
-    evaluator: &'a SurfaceEnergy,
-    blocks: &'a [GuideBlock],
-}
-
-impl<'a> Cliques<'a> {
-    fn iter(&self) -> impl Iterator<Item = &'a [u32]> {
-        let evaluator = self.evaluator;
-        let groups = evaluator.groups().iter().filter(move |g| !is_guided(evaluator, g));
-        let patches = groups.flat_map(|g| g.controls.chunks(g.per_patch));
-        patches.chain(self.blocks.iter().map(|b| &b.vertices[..]))
     }
 }
 
@@ -337,4 +301,12 @@ fn pull_entries(freedom: &Freedom, pulls: &[Pull]) -> Vec<((usize, usize), f64)>
         }
     }
     out
+}
+
+/// The unknowns a coordinate of the control points depends on, with the derivatives by them.
+fn unknowns_of(freedom: &Freedom, coordinate: usize) -> impl Iterator<Item = (usize, f64)> {
+    let (v, c) = (coordinate / 3, coordinate % 3);
+    (0..freedom.dim[v] as usize)
+        .map(move |k| (freedom.start[v] as usize + k, freedom.frame[v].col(k)[c]))
+        .filter(|(_, derivative)| *derivative != 0.0)
 }

@@ -5,8 +5,8 @@ use subdiv_catmull_clark::{BasisId, SubdivisionSurface, cubic_basis};
 /// Widest vector the kernels meet; tables are padded to it.
 pub(crate) const MAX_LANES: usize = 8;
 
-/// Gauss-Legendre points per side of a patch.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
+/// Gauss-Legendre points per side of a patch; a text such as `8x16` in files.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Quadrature {
     /// On bi-cubic patches.
     pub regular: usize,

@@ -2,13 +2,12 @@
 //! fairest rings of any section.
 
 use curvature_variation::{
-    Constraints, EnergyTable, FairError, FairOptions, Fairing, Functional, Quadrature,
-    SurfaceEnergy, SurfaceSamples, Workspace, fair, fair_in_family, fitted_torus,
+    EnergyTable, Error, Functional, Input, Options, Quadrature, Solution, SurfaceEnergy,
+    SurfaceSamples, Workspace, fitted_torus, solve,
 };
 use fixtures::quad_graphs;
 use geom_core::PolyMesh;
 use std::f64::consts::{FRAC_1_SQRT_2, PI, TAU};
-use std::ops::ControlFlow;
 use subdiv_catmull_clark::{Blend, Creases, SubdivisionSurface};
 
 const MEHLUM_TARROU: Functional = Functional::MehlumTarrou { w1: 1.0, w3: 1.0 };
@@ -101,18 +100,18 @@ fn the_error_is_the_saw_tooth_of_cubic_splines() {
     }
 }
 
-fn options(energy: &str) -> FairOptions {
-    FairOptions { energy: energy.parse().expect("an energy"), levels: 0, ..FairOptions::default() }
+fn options(energy: &str) -> Options {
+    Options { energy: energy.parse().expect("an energy"), levels: 0, ..Options::default() }
 }
 
-fn fairest_torus(nu: usize, nv: usize, energy: &str) -> Fairing {
+fn fairest_torus(nu: usize, nv: usize, energy: &str) -> Solution {
     let member = |rho: f64| quad_graphs::torus(nu, nv, 1.0, rho);
-    fair_in_family(&member(0.3), &[member(0.6)], &options(energy), |_| ControlFlow::Continue(()))
-        .expect("a fair torus")
+    let family = Input { members: vec![member(0.6)], ..Input::from(member(0.3)) };
+    solve(&family, &options(energy), &mut ()).expect("a fair torus")
 }
 
-fn ratio(result: &Fairing) -> f64 {
-    fitted_torus(&result.mesh, &result.surface).expect("a torus").0.ratio()
+fn ratio(result: &Solution) -> f64 {
+    fitted_torus(&result.result, &result.surface).expect("a torus").0.ratio()
 }
 
 #[test]
@@ -158,11 +157,8 @@ fn fairest_rings_of_any_section_are_not_tori() {
         ("0.92*bending + 0.08*mehlum_tarrou", 136.950, 0.5017, 137.861),
     ] {
         let mesh = quad_graphs::torus(24, 96, 1.0, 0.4);
-        let none = Constraints::default();
-        let result =
-            fair(&mesh, &Creases::none(), &none, &options(energy), |_| ControlFlow::Continue(()))
-                .expect("a fair ring");
-        let (got, got_ratio) = (result.report.energy_final, ratio(&result));
+        let result = solve(&Input::from(mesh), &options(energy), &mut ()).expect("a fair ring");
+        let (got, got_ratio) = (result.metrics.energy_final, ratio(&result));
         assert!((got / want_energy - 1.0).abs() < 4e-3, "{energy}: {got}");
         assert!(got < torus_energy, "{energy}: {got}");
         assert!((got_ratio - want_ratio).abs() < 4e-3, "{energy}: {got_ratio}");
@@ -172,13 +168,11 @@ fn fairest_rings_of_any_section_are_not_tori() {
 #[test]
 fn bending_minimiser_of_genus_one_is_the_clifford_torus() {
     let mesh = quad_graphs::torus(16, 8, 1.0, 0.4);
-    let refined = FairOptions { levels: 1, ..options("bending") };
-    let none = Constraints::default();
-    let result = fair(&mesh, &Creases::none(), &none, &refined, |_| ControlFlow::Continue(()))
-        .expect("a torus");
-    assert!((result.report.energy_final / (8.0 * PI * PI) - 1.0).abs() < 2e-4);
+    let refined = Options { levels: 1, ..options("bending") };
+    let result = solve(&Input::from(mesh), &refined, &mut ()).expect("a torus");
+    assert!((result.metrics.energy_final / (8.0 * PI * PI) - 1.0).abs() < 2e-4);
     // Dense samples: the vertices slide freely along the torus and need not meet its top.
-    let points = SurfaceSamples::new(&result.mesh, &result.surface, 9).positions;
+    let points = SurfaceSamples::new(&result.result, &result.surface, 9).positions;
     let (mut inner, mut outer, mut height) = (f64::INFINITY, 0.0_f64, 0.0_f64);
     for p in &points {
         let reach = p.x.hypot(p.y);
@@ -200,9 +194,9 @@ fn bending_minimiser_of_genus_one_is_the_clifford_torus() {
 #[test]
 fn members_of_a_family_share_their_faces() {
     let (mesh, other) = (quad_graphs::torus(12, 8, 1.0, 0.5), quad_graphs::torus(8, 12, 1.0, 0.5));
-    let error = fair_in_family(&mesh, &[other], &options("bending"), |_| ControlFlow::Continue(()))
-        .expect_err("other faces");
-    assert_eq!(error, FairError::OtherFaces { member: 1 });
+    let family = Input { members: vec![other], ..Input::from(mesh) };
+    let error = solve(&family, &options("bending"), &mut ()).expect_err("other faces");
+    assert_eq!(error, Error::OtherFaces { member: 1 });
     let text = "mesh 1 of the family has other faces than the input; move its vertices only";
     assert_eq!(error.to_string(), text);
 }

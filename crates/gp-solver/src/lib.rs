@@ -45,7 +45,8 @@
 //! - [`Run`] steps once at a time by Levenberg-Marquardt, guided projection or Gauss-Newton
 //!   ([`Options`]); [`solve`] does it to the end. An [`Observer`] sees every step, can stop it and
 //!   keeps its [`Checkpoint`]; a [`Report`] tells the energy of every term at every iteration.
-//! - The same family on other models: [`damped_step`] (damping per group), [`lbfgs`].
+//! - The same family on other models: [`damped_step`] (damping per group), [`lbfgs`],
+//!   and [`Rounds`] of it with a new metric each.
 //! - Results do not depend on the number of threads, bit for bit.
 //!
 //! Without the default feature `sparse` there is the band factorisation only, and no faer.
@@ -58,6 +59,7 @@ mod clock;
 mod damping;
 mod elements;
 mod error;
+mod evaluate;
 mod fields;
 mod lbfgs;
 mod least_squares;
@@ -71,6 +73,7 @@ mod problem;
 mod qp;
 mod quadratic;
 mod report;
+mod rounds;
 mod schedule;
 mod trust_region;
 mod variables;
@@ -82,6 +85,7 @@ pub use checkpoint::{Checkpoint, Fingerprint};
 pub use damping::DampingRule;
 pub use elements::Elements;
 pub use error::{Quantity, SolverError};
+pub use evaluate::ElementVisitor;
 pub use fields::{Counts, Field, Fields, List, ListItem, OptionValue};
 pub use lbfgs::{Euclidean, LbfgsOptions, Metric, Objective, lbfgs};
 pub use least_squares::{Run, Step, StepModel, System, Triplets, solve, solve_observed};
@@ -99,6 +103,7 @@ pub use qp::{BoundedQp, SparseQp};
 pub use qp::{DenseQp, LinearEquation, QpSolution, QuadraticForm, QuadraticTerm};
 pub use quadratic::{Equation, QuadraticBuilder, QuadraticConstraints};
 pub use report::{IterationRecord, Report, Status, Term, Timings};
+pub use rounds::{Renewed, RoundOptions, Rounds};
 pub use schedule::{Extra, RunReport, Stage, StageReport};
 pub use trust_region::{Accepted, Attempt, DampedModel, DampingPolicy, Verdict, damped_step};
 pub use variables::{Group, Variables};

@@ -139,8 +139,11 @@ impl<'a> Problem<'a> {
         }
     }
 
-    /// Checks the blocks against the number of unknowns.
-    pub(crate) fn check(&self) -> Result<(), SolverError> {
+    /// Checks the blocks against the number of unknowns, and the order.
+    ///
+    /// # Errors
+    /// What [`SolverError`] says of malformed blocks and orderings.
+    pub fn check(&self) -> Result<(), SolverError> {
         let mut seen = Seen::new(self.unknowns());
         for slot in &self.slots {
             seen.check(&slot.block)?;

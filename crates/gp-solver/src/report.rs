@@ -120,6 +120,26 @@ pub struct Report {
 }
 
 impl Report {
+    /// Of nothing done yet with so many unknowns, to add to.
+    #[must_use]
+    pub fn new(status: Status, variables: usize) -> Self {
+        Self {
+            status,
+            iterations: 0,
+            initial_energy: f64::NAN,
+            final_energy: f64::NAN,
+            terms: Vec::new(),
+            history: Vec::new(),
+            factorizations: 0,
+            evaluations: 0,
+            gradient_norm: f64::NAN,
+            damping: 0.0,
+            variables,
+            rows: 0,
+            timings: Timings::default(),
+        }
+    }
+
     /// Wall-clock milliseconds per taken step (the whole solve if none was taken).
     #[must_use]
     pub fn ms_per_iteration(&self) -> f64 {

@@ -1,14 +1,14 @@
 //! `umbilic analyze INPUT`.
 
 use crate::args::ReportArgs;
-use crate::commands::fair::BlendRings;
 use crate::context::Context;
 use crate::failure::Failure;
 use crate::outcome::{Outcome, Status};
 use crate::report_support;
-use curvature_variation::{SurfaceAnalysis, fitted_torus};
+use curvature_variation::{Rings, SurfaceAnalysis, fitted_torus};
 use exchange::{Mesh, Model};
 use geom_core::{CurvatureStatistics, ValueRange, mesh_curvature_statistics};
+use gp_solver::OptionValue;
 use serde::Serialize;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -30,7 +30,8 @@ pub(crate) struct Analyze {
     /// Rings of patches the smooth blends at extraordinary vertices cover, as in fair
     /// [default: auto]
     #[arg(long, value_name = "N|auto")]
-    blend_rings: Option<BlendRings>,
+    #[arg(value_parser = Rings::read)]
+    blend_rings: Option<Rings>,
     #[command(flatten)]
     report: ReportArgs,
 }
@@ -40,7 +41,7 @@ impl Analyze {
         self.report.check()?;
         let model =
             exchange::read_model(&self.input).map_err(|e| Failure::input(&self.input, e))?;
-        let rings = self.blend_rings.and_then(|rings| rings.0);
+        let rings = self.blend_rings.and_then(Rings::count);
         let Measured { kind, statistics, subdivision, warnings } =
             measure(&self.input, &model, rings)?;
         let mut metrics = AnalyzeMetrics::new(kind, &statistics);

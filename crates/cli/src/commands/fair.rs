@@ -6,19 +6,19 @@ use crate::failure::Failure;
 use crate::layered;
 use crate::outcome::Outcome;
 use crate::report_support;
+use crate::watch::Watch;
 use curvature_variation::{
-    Constraints, Energy, FairOptions, FairProgress, FairReport, Fairing, Functional, Method,
-    Quadrature, SplinePatches, SurfaceSamples, SymmetryMode, fair, fair_in_family, fitted_torus,
-    spline_patches,
+    BlendKind, Constraints, Energy, Functional, Input, Method, Options, Rings, Solution,
+    SplinePatches, SurfaceSamples, Symmetry, solve, spline_patches,
 };
 use exchange::{Field, LengthUnit, Mesh, Model, NamedSurface};
-use geom_core::{BoundingBox, DVec3, UmbilicKind};
+use geom_core::{DVec3, UmbilicKind};
+use gp_solver::OptionValue;
 use report::{EnergyHistory, FieldScale, LineRole, LineSet, ScalarField, Series, SurfaceView};
-use serde::{Deserialize, Serialize};
+use serde::Deserialize;
 use std::collections::BTreeMap;
-use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
-use subdiv_catmull_clark::{Blend, CreaseList, Creases, SubdivisionSurface};
+use subdiv_catmull_clark::{CreaseList, Creases, SubdivisionSurface};
 
 /// Arguments of `fair`.
 #[derive(Debug, clap::Args)]
@@ -53,7 +53,7 @@ struct Settings {
     /// Refinements, each followed by a minimisation [default: 2]
     #[arg(long, value_name = "N")]
     levels: Option<usize>,
-    /// Steps per level at most [default: 400]
+    /// Steps per level at most [default: 2000]
     #[arg(long, value_name = "N")]
     iterations: Option<usize>,
     /// How to descend [default: lagged-gauss-newton]
@@ -66,7 +66,8 @@ struct Settings {
     /// Rings of patches a smooth blend covers where there is room: a number, or auto for more of
     /// them on finer meshes [default: auto]
     #[arg(long, value_name = "N|auto")]
-    blend_rings: Option<BlendRings>,
+    #[arg(value_parser = Rings::read)]
+    blend_rings: Option<Rings>,
     /// Keep the boundary and the two rings next to it
     #[arg(long, num_args = 0, default_missing_value = "true")]
     clamp_boundary: Option<bool>,
@@ -114,50 +115,14 @@ enum BlendName {
     Flat,
 }
 
-/// Rings of a blend.
-#[derive(Clone, Copy, Debug, Deserialize)]
-#[serde(try_from = "RingsValue")]
-pub(crate) struct BlendRings(pub(crate) Option<usize>);
-
-/// The same in a configuration file, where it may be a number.
-#[derive(Debug, Deserialize)]
-#[serde(untagged)]
-enum RingsValue {
-    Number(usize),
-    Text(String),
-}
-
-impl TryFrom<RingsValue> for BlendRings {
-    type Error = String;
-
-    fn try_from(value: RingsValue) -> Result<Self, String> {
-        match value {
-            RingsValue::Number(n) => n.to_string().parse(),
-            RingsValue::Text(text) => text.parse(),
-        }
-    }
-}
-
-impl std::str::FromStr for BlendRings {
-    type Err = String;
-
-    fn from_str(text: &str) -> Result<Self, String> {
-        match text.parse() {
-            _ if text == "auto" => Ok(Self(None)),
-            Ok(rings) if rings > 0 => Ok(Self(Some(rings))),
-            _ => Err(format!("`{text}` is no number of rings; give a number from 1 up, or auto")),
-        }
-    }
-}
-
 impl Fair {
     pub(crate) fn run(self, context: &Context) -> Result<Outcome, Failure> {
         self.output.check()?;
         self.report.check()?;
         let settings = self.settings.over(self.config.load()?);
         let family = settings.family.clone().unwrap_or_default();
-        let Resolved { options, constraints, creases: listed } = settings.resolve()?;
-        let held = !constraints.is_empty() || listed.is_some();
+        let Resolved { options, constraints, creases: listed, symmetries } = settings.resolve()?;
+        let held = !constraints.is_empty() || options.clamp_boundary || listed.is_some();
         if held && !family.is_empty() {
             return Err(Failure::usage(
                 "--family leaves no vertex to fix; drop --fix, --creases and --clamp-boundary",
@@ -170,48 +135,32 @@ impl Fair {
             Some((path, list)) => list.for_mesh(&mesh).map_err(|e| Failure::input(path, e))?,
             None => Creases::none(),
         };
-        let bar = context.progress("fairing", (options.levels + 1) * options.iterations);
-        let mut observer = |p: &FairProgress| {
-            let done = p.level * options.iterations + p.iteration;
-            bar.at(done, format!("{} vertices, energy {:.4}", p.vertices, p.energy));
-            if context.interrupted() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
-        };
-        let result = if family.is_empty() {
-            fair(&mesh, &creases, &constraints, &options, &mut observer)
-        } else {
-            let members =
-                family.iter().map(|path| read_member(path)).collect::<Result<Vec<_>, _>>()?;
-            fair_in_family(&mesh, &members, &options, &mut observer)
-        }
-        .map_err(|e| Failure::input(&self.input, e))?;
-        drop(bar);
+        let members = family.iter().map(|path| read_member(path)).collect::<Result<Vec<_>, _>>()?;
+        let input = Input { mesh, creases, constraints, members, symmetries };
+        let mut watch = Watch::new(context, "fairing");
+        let mut result =
+            solve(&input, &options, &mut watch).map_err(|e| Failure::input(&self.input, e))?;
+        drop(watch);
+        result.metrics.peak_memory_mb = peak_memory_mb();
         let splines = match self.output.output.iter().find(|path| is_spline_file(path)) {
             Some(path) => Some(
-                spline_patches(&result.mesh, &result.surface)
+                spline_patches(&result.result, &result.surface)
                     .map_err(|e| Failure::input(path, e))?,
             ),
             None => None,
         };
+        if let Some(splines) = &splines {
+            result.metrics.add_splines(splines);
+        }
         let mut outcome = Outcome::new(result.report.status, result.report.iterations)
             .with_input(&self.input)
-            .with_metrics(&MetricsObject::new(&result, splines.as_ref()))?;
+            .with_metrics(&result.metrics)?;
         outcome.summary = summary(&result, &options);
         outcome.warnings.clone_from(&model.warnings);
-        if let Some(splines) = &splines {
-            outcome.summary.push(spline_summary(splines));
-            if splines.max_deviation > FITTED_TOLERANCE * diagonal(&result.mesh) {
-                outcome.warnings.push(format!(
-                    "fitted spline patches are up to {:.1e} off the surface; add a level",
-                    splines.max_deviation
-                ));
-            }
-        }
-        if result.report.quadrature_gap > 0.01 {
-            outcome.warnings.push(format!(
-                "the energy changes by {:.1} % with a finer quadrature; add a level",
-                100.0 * result.report.quadrature_gap
-            ));
-        }
+        let fitted = splines.as_ref().and_then(|s| s.warning(&result.result));
+        let warnings = fitted.iter().chain(&result.warnings);
+        outcome.warnings.extend(warnings.map(ToString::to_string));
+        outcome.summary.extend(splines.as_ref().map(spline_summary));
         outcome.require_converged = self.converged.require_converged;
         for path in self.output.output {
             let content = content_for(&path, &result, splines.as_ref(), &model.unit);
@@ -230,35 +179,35 @@ impl Fair {
 
 /// What the flags and the files they name come to.
 struct Resolved {
-    options: FairOptions,
+    options: Options,
     constraints: Constraints,
     /// With the file, for messages.
     creases: Option<(PathBuf, CreaseList)>,
+    symmetries: Option<Vec<[[f64; 3]; 3]>>,
 }
 
 impl Settings {
     fn resolve(self) -> Result<Resolved, Failure> {
-        let defaults = FairOptions::default();
+        let defaults = Options::default();
         let energy = match &self.energy {
             Some(text) => text.parse::<Energy>().map_err(Failure::usage)?,
             None => defaults.energy,
         };
-        let symmetry = match self.symmetry.as_deref() {
-            None | Some("auto") => SymmetryMode::Auto,
-            Some("none") => SymmetryMode::None,
+        let (symmetry, symmetries) = match self.symmetry.as_deref() {
+            None | Some("auto") => (Symmetry::Auto, None),
+            Some("none") => (Symmetry::None, None),
             Some(file) => {
                 let path = Path::new(file);
                 let declared: SymmetryFile =
                     exchange::read_ron(path).map_err(|e| Failure::input(path, e))?;
-                SymmetryMode::Declared(declared.matrices)
+                (Symmetry::Auto, Some(declared.matrices))
             }
         };
-        let mut constraints = match &self.fix {
+        let constraints = match &self.fix {
             Some(path) => exchange::read_ron(path).map_err(|e| Failure::input(path, e))?,
             None => Constraints::default(),
         };
-        constraints.clamp_boundary |= self.clamp_boundary.unwrap_or(false);
-        let options = FairOptions {
+        let options = Options {
             energy,
             levels: self.levels.unwrap_or(defaults.levels),
             iterations: self.iterations.unwrap_or(defaults.iterations),
@@ -269,11 +218,11 @@ impl Settings {
                 MethodName::Lbfgs => Method::Lbfgs,
             }),
             blend: self.blend.map_or(defaults.blend, |b| match b {
-                BlendName::Smooth => Blend::Smooth,
-                BlendName::Flat => Blend::Flat,
+                BlendName::Smooth => BlendKind::Smooth,
+                BlendName::Flat => BlendKind::Flat,
             }),
-            blend_rings: self.blend_rings.and_then(|rings| rings.0),
-            quadrature: Quadrature::NORMAL,
+            blend_rings: self.blend_rings.unwrap_or(defaults.blend_rings),
+            clamp_boundary: self.clamp_boundary.unwrap_or(defaults.clamp_boundary),
             symmetry,
             ..defaults
         };
@@ -284,7 +233,7 @@ impl Settings {
             }
             None => None,
         };
-        Ok(Resolved { options, constraints, creases })
+        Ok(Resolved { options, constraints, creases, symmetries })
     }
 }
 
@@ -313,56 +262,6 @@ fn read_member(path: &Path) -> Result<geom_core::PolyMesh, Failure> {
     read_control_mesh(path, &model)
 }
 
-/// The `metrics` object.
-#[derive(Serialize)]
-struct MetricsObject {
-    energies: BTreeMap<&'static str, f64>,
-    quadrature_gap: f64,
-    gauss_bonnet_residual: Option<f64>,
-    energy_initial: f64,
-    energy_final: f64,
-    gradient_norm: f64,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    torus_ratio: Option<f64>,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    torus_fit_rms: Option<f64>,
-    vertices: usize,
-    patches: usize,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    blend_rings: Option<[usize; 2]>,
-    ms_per_gradient: f64,
-    peak_memory_mb: Option<f64>,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    fitted_patches: Option<usize>,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    fitted_deviation_max: Option<f64>,
-}
-
-impl MetricsObject {
-    fn new(result: &Fairing, splines: Option<&SplinePatches>) -> Self {
-        let FairReport { after, quadrature_gap, energy_initial, energy_final, .. } = &result.report;
-        let residual = result.report.gauss_bonnet_residual;
-        let torus = fitted_torus(&result.mesh, &result.surface);
-        Self {
-            energies: after.by_name(),
-            torus_ratio: torus.map(|(torus, _)| torus.ratio()),
-            torus_fit_rms: torus.map(|(_, rms)| rms),
-            quadrature_gap: *quadrature_gap,
-            gauss_bonnet_residual: residual.is_finite().then_some(residual),
-            energy_initial: *energy_initial,
-            energy_final: *energy_final,
-            gradient_norm: result.report.gradient_norm,
-            vertices: result.mesh.vertex_count(),
-            patches: result.mesh.face_count(),
-            blend_rings: result.surface.blend_rings(),
-            ms_per_gradient: 1e3 * result.report.seconds_per_gradient,
-            peak_memory_mb: peak_memory_mb(),
-            fitted_patches: splines.map(|s| s.fitted),
-            fitted_deviation_max: splines.map(|s| s.max_deviation),
-        }
-    }
-}
-
 /// Peak resident memory of this process, where the system tells.
 fn peak_memory_mb() -> Option<f64> {
     let status = std::fs::read_to_string("/proc/self/status").ok()?;
@@ -371,33 +270,32 @@ fn peak_memory_mb() -> Option<f64> {
     Some(kilobytes / 1024.0)
 }
 
-fn summary(result: &Fairing, options: &FairOptions) -> Vec<String> {
-    let report = &result.report;
+fn summary(result: &Solution, options: &Options) -> Vec<String> {
+    let (report, metrics) = (&result.report, &result.metrics);
     let mut lines = vec![format!(
         "{} vertices, {} patches, {} steps",
-        result.mesh.vertex_count(),
-        result.mesh.face_count(),
-        report.iterations
+        metrics.vertices, metrics.patches, report.iterations
     )];
-    for level in &report.levels {
+    for (stage, level) in report.stages.iter().zip(&result.levels) {
+        let solver = &stage.solver;
         lines.push(format!(
             "  {:6} vertices        {:.4} to {:.4} in {} steps, {} symmetries, {:.2} s",
             level.vertices,
-            level.initial_energy,
-            level.final_energy,
-            level.iterations,
+            solver.initial_energy,
+            solver.final_energy,
+            solver.iterations,
             level.symmetries,
-            level.seconds
+            solver.timings.total.as_secs_f64()
         ));
     }
     lines.push(format!(
         "  {}  {:.4} (before {:.4}), quadrature gap {:.1e}",
-        options.energy, report.energy_final, report.energy_initial, report.quadrature_gap
+        options.energy, metrics.energy_final, metrics.energy_initial, metrics.quadrature_gap
     ));
-    if let Some(limit) = report.extrapolated {
+    if let Some(limit) = result.extrapolated {
         lines.push(format!("  extrapolated to vanishing mesh size {limit:.4}"));
     }
-    let value = |f: Functional| report.after.get(f);
+    let value = |f: Functional| result.after.get(f);
     lines.push(format!(
         "  bending {:.4}, Willmore {:.4}, SI-Mehlum-Tarrou {:.4}, SI-F1 {:.4}, SI-F3 {:.4}",
         value(Functional::Bending),
@@ -412,22 +310,13 @@ fn summary(result: &Fairing, options: &FairOptions) -> Vec<String> {
         0.5 * mvs,
         0.5 * cross
     ));
-    if report.gauss_bonnet_residual.is_finite() {
-        lines.push(format!("  Gauss-Bonnet residual {:.1e}", report.gauss_bonnet_residual));
+    if let Some(residual) = metrics.gauss_bonnet_residual {
+        lines.push(format!("  Gauss-Bonnet residual {residual:.1e}"));
     }
-    if let Some((torus, rms)) = fitted_torus(&result.mesh, &result.surface) {
-        let ratio = torus.ratio();
+    if let (Some(ratio), Some(rms)) = (metrics.torus_ratio, metrics.torus_fit_rms) {
         lines.push(format!("  nearest torus has radius ratio {ratio:.4}, off by {rms:.1e} rms"));
     }
     lines
-}
-
-/// Distance of a fitted spline patch from the surface that is worth a warning, as a share of the
-/// bounding box' diagonal.
-const FITTED_TOLERANCE: f64 = 1e-4;
-
-fn diagonal(mesh: &geom_core::PolyMesh) -> f64 {
-    BoundingBox::of(mesh.positions().iter().copied()).map_or(0.0, BoundingBox::diagonal)
 }
 
 /// Whether a file takes spline surfaces.
@@ -449,7 +338,7 @@ fn spline_summary(splines: &SplinePatches) -> String {
 /// Control mesh, sampled surface or spline patches, as the format asks for.
 fn content_for(
     path: &Path,
-    result: &Fairing,
+    result: &Solution,
     splines: Option<&SplinePatches>,
     unit: &LengthUnit,
 ) -> Model {
@@ -463,7 +352,7 @@ fn content_for(
     }
     match exchange::extension_of(path).as_str() {
         "glb" | "gltf" => {
-            let samples = samples_of(&result.mesh, &result.surface);
+            let samples = samples_of(&result.result, &result.surface);
             let mut mesh = Mesh::new(samples.positions, samples.triangles);
             mesh.normals = samples.normals;
             let field = |name: &str, values| Field { name: name.to_owned(), values };
@@ -475,7 +364,7 @@ fn content_for(
             ];
             Model::of_mesh(mesh, unit)
         }
-        _ => Model::of_mesh(Mesh::from_poly_mesh(&result.mesh), unit),
+        _ => Model::of_mesh(Mesh::from_poly_mesh(&result.result), unit),
     }
 }
 
@@ -486,8 +375,8 @@ fn samples_of(mesh: &geom_core::PolyMesh, surface: &SubdivisionSurface) -> Surfa
 
 fn fill_report(
     page: &mut report::Report,
-    result: &Fairing,
-    options: &FairOptions,
+    result: &Solution,
+    options: &Options,
     unit: &LengthUnit,
 ) -> Result<(), Failure> {
     page.length_unit = unit.to_string();
@@ -496,14 +385,14 @@ fn fill_report(
     page.option("iterations per level", options.iterations);
     let before = samples_of(&result.initial, &result.initial_surface);
     page.stages.push(view("before", &before, &page.length_unit)?);
-    let samples = samples_of(&result.mesh, &result.surface);
+    let samples = samples_of(&result.result, &result.surface);
     page.option("umbilics of the result", umbilics(&samples));
     page.stages.push(view("after", &samples, &page.length_unit)?);
     let mut history = EnergyHistory::default();
     let mut values = Vec::new();
-    for level in &result.report.levels {
-        history.marks.push((values.len(), format!("{} vertices", level.vertices)));
-        values.extend_from_slice(&level.history);
+    for stage in &result.report.stages {
+        history.marks.push((values.len(), format!("{} vertices", stage.stage.name)));
+        values.extend(stage.solver.history.iter().map(|step| step.energy));
     }
     history.terms.push(Series { name: options.energy.to_string(), values });
     page.energies = Some(history);

@@ -1,7 +1,7 @@
 //! Times of one energy with its gradient on a sphere-like mesh: least and median over many
 //! evaluations, on one thread and on two, as a table in Markdown.
 //!
-//! `cargo run --release --example gradient_time -- [SIDE] [EVALUATIONS]`: a cube with SIDE × SIDE
+//! `cargo bench -p curvature-variation --bench gradient_time -- [SIDE] [EVALUATIONS]`: a cube with SIDE × SIDE
 //! quads a face (38, the default, has 8,666 vertices and 24 patches of 256 samples) and the torus
 //! of nearest size, which has none of those.
 
@@ -15,7 +15,7 @@ use subdiv_catmull_clark::{Blend, Creases, SubdivisionSurface};
 
 fn main() -> Result<(), Box<dyn Error>> {
     let argument = |k: usize, default: usize| -> Result<usize, std::num::ParseIntError> {
-        std::env::args().nth(k).map_or(Ok(default), |text| text.parse())
+        std::env::args().filter(|a| a != "--bench").nth(k).map_or(Ok(default), |text| text.parse())
     };
     let side = argument(1, 38)?.max(2);
     let evaluations = argument(2, 300)?.max(1);

@@ -1,12 +1,13 @@
 //! Compares the methods of descent: steps and seconds from the raw theta graph of genus 2 to given
 //! energies, on one mesh without levels and without symmetry, as a table in Markdown.
 //!
-//! `cargo run --release --example methods -- [REFINEMENTS] [ITERATIONS]`: 2 (the default) and 3
+//! `cargo bench -p curvature-variation --bench methods -- [REFINEMENTS] [ITERATIONS]`: 2 (the default) and 3
 //! refinements of the base mesh have 382 and 1,534 vertices. A run ends at the last energy; a dash
 //! says that an energy was not reached.
 
-use curvature_variation::{Constraints, FairOptions, Method, SymmetryMode, fair};
+use curvature_variation::{Input, Method, Options, Symmetry, solve};
 use fixtures::quad_graphs;
+use gp_solver::Progress;
 use std::error::Error;
 use std::io::Write as _;
 use std::ops::ControlFlow;
@@ -20,7 +21,7 @@ const GOALS: [f64; 4] = [1.3, 1.1, 1.02, 1.005];
 
 fn main() -> Result<(), Box<dyn Error>> {
     let argument = |k: usize, default: usize| -> Result<usize, std::num::ParseIntError> {
-        std::env::args().nth(k).map_or(Ok(default), |text| text.parse())
+        std::env::args().filter(|a| a != "--bench").nth(k).map_or(Ok(default), |text| text.parse())
     };
     let refinements = argument(1, 2)?.clamp(2, 3);
     let iterations = argument(2, 8000)?;
@@ -35,17 +36,18 @@ fn main() -> Result<(), Box<dyn Error>> {
     writeln!(out, "| method | {} | factorisations | end |", heads.join(" | "))?;
     writeln!(out, "|---|{}", "---|".repeat(GOALS.len() + 2))?;
     for method in [Method::Lbfgs, Method::Sobolev, Method::GaussNewton, Method::LaggedGaussNewton] {
-        let options = FairOptions {
+        let options = Options {
             levels: 0,
             iterations,
             method,
-            symmetry: SymmetryMode::None,
+            symmetry: Symmetry::None,
             tolerance: 1e-9,
-            ..FairOptions::default()
+            ..Options::default()
         };
         let mut reached: Vec<(usize, f64)> = Vec::new();
         let begin = Instant::now();
-        let result = fair(&mesh, &Creases::none(), &Constraints::default(), &options, |p| {
+        let input = Input::from(mesh.clone());
+        let result = solve(&input, &options, &mut |p: &Progress<'_>| {
             while reached.len() < goals.len() && p.energy <= goals[reached.len()] {
                 reached.push((p.iteration, begin.elapsed().as_secs_f64()));
             }
@@ -55,7 +57,7 @@ fn main() -> Result<(), Box<dyn Error>> {
                 ControlFlow::Continue(())
             }
         })?;
-        let level = &result.report.levels[0];
+        let level = &result.report.stages[0].solver;
         write!(out, "| {method:?} ")?;
         for k in 0..goals.len() {
             match reached.get(k) {

@@ -1,0 +1,123 @@
+//! A level's energy with its metric and its linear conditions.
+
+use super::energy::LevelEnergy;
+use super::projected::Projected;
+use crate::element::Mixture;
+use crate::functional::ROOT_EPSILON;
+use crate::limits::LinearRow;
+use crate::metric::MetricAssembly;
+use gp_solver::{Metric, Observer, SolverError, Status};
+
+/// How often a matrix that is not positive definite is given more of the Sobolev norm.
+const MENDINGS: usize = 12;
+
+/// What a step stands on.
+pub(crate) struct Conditioned<'a> {
+    pub(crate) energy: LevelEnergy<'a>,
+    pub(super) steering: Steering,
+    /// Conditions that hold at the start already.
+    conditions: Vec<LinearRow>,
+}
+
+/// The metric of a round or step on the directions that keep the conditions.
+pub(super) struct Steering {
+    metric: Option<MetricAssembly>,
+    /// Whether steps are in the metric; plain L-BFGS needs it for the conditions at most.
+    is_metric: bool,
+    projected: Projected,
+}
+
+impl Steering {
+    /// Replaces a vector by its image under the inverse of the metric.
+    fn solve(&self, vector: &mut [f64]) {
+        if let Some(metric) = self.metric.as_ref().filter(|_| self.is_metric) {
+            metric.solve_in_place(vector);
+        }
+    }
+}
+
+impl Metric for Steering {
+    fn apply_inverse(&mut self, gradient: &mut [f64]) {
+        self.solve(gradient);
+        self.projected.keep(gradient);
+    }
+}
+
+impl<'a> Conditioned<'a> {
+    pub(crate) fn new(
+        energy: LevelEnergy<'a>,
+        metric: Option<MetricAssembly>,
+        conditions: Vec<LinearRow>,
+    ) -> Self {
+        let steering = Steering { metric, is_metric: true, projected: Projected::default() };
+        Self { energy, steering, conditions }
+    }
+
+    /// The linear conditions, and the gradient of the area where the scale is free: a step along
+    /// which it stays put loses nothing, because scaling does not change the energy.
+    pub(super) fn condition_rows(&mut self, y: &[f64]) -> Vec<Vec<f64>> {
+        let mut rows: Vec<Vec<f64>> = self.conditions.iter().map(|r| r.row.clone()).collect();
+        if self.energy.scale_free {
+            rows.push(self.energy.area_gradient(y));
+        }
+        rows
+    }
+
+    /// Makes `rows` the conditions that steps keep; `is_metric` says whether the steps are in the
+    /// metric factored last.
+    pub(super) fn keep(&mut self, rows: Vec<Vec<f64>>, is_metric: bool) {
+        self.steering.is_metric = is_metric;
+        let projected = Projected::new(rows, |vector| self.steering.solve(vector));
+        self.steering.projected = projected;
+    }
+
+    /// Factors the metric at `y`, with more of the Sobolev norm until it is positive definite;
+    /// returns how many factorisations that took, or that it was stopped.
+    pub(super) fn factor(
+        &mut self,
+        y: &[f64],
+        gauss_newton: bool,
+        mut sobolev: f64,
+        observer: &mut dyn Observer,
+    ) -> Result<Result<usize, Status>, SolverError> {
+        let area = self.energy.area(y);
+        let Some(metric) = &mut self.steering.metric else { return Ok(Ok(0)) };
+        // The patches' gradients are not needed while the matrix is there.
+        self.energy.work = Default::default();
+        let mut coefficients = self.energy.energy.coefficients();
+        coefficients.plain.root_epsilon = ROOT_EPSILON / area;
+        coefficients.plain.barrier = self.energy.barrier;
+        let density = coefficients.plain.plus(area, &coefficients.scaled);
+        let LevelEnergy { evaluator, freedom, x, .. } = &self.energy;
+        let extra = self.energy.extra.as_ref().filter(|_| gauss_newton);
+        let stop = &mut || observer.stop_requested();
+        for attempt in 1.. {
+            let mixture = Mixture { density, gauss_newton, sobolev };
+            match metric.factor(evaluator, freedom, x, area, &mixture, extra, stop) {
+                Ok(true) => return Ok(Ok(attempt)),
+                Ok(false) => return Ok(Err(Status::Interrupted)),
+                Err(SolverError::NotPositiveDefinite { .. }) if attempt < MENDINGS => {
+                    sobolev = 10.0 * sobolev.max(1e-6);
+                }
+                Err(error) => return Err(error),
+            }
+        }
+        Ok(Ok(0))
+    }
+
+    /// Meets the linear conditions at the start.
+    pub(crate) fn meet_conditions(
+        &mut self,
+        y: &mut [f64],
+        observer: &mut dyn Observer,
+    ) -> Result<(), SolverError> {
+        if self.conditions.is_empty() || self.factor(y, false, 1.0, observer)?.is_err() {
+            return Ok(());
+        }
+        let targets: Vec<f64> = self.conditions.iter().map(|r| r.target).collect();
+        let rows = self.conditions.iter().map(|r| r.row.clone()).collect();
+        self.keep(rows, true);
+        self.steering.projected.restore(&targets, y);
+        Ok(())
+    }
+}

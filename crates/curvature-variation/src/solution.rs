@@ -1,0 +1,41 @@
+//! What a fairing hands back.
+
+use geom_core::PolyMesh;
+use gp_solver::RunReport;
+use subdiv_catmull_clark::{Creases, SubdivisionSurface};
+
+use crate::evaluator::EnergyTable;
+use crate::level::LevelNumbers;
+use crate::metrics::{Metrics, Warning};
+
+/// A faired surface with what is to be said about it.
+#[derive(Clone, Debug)]
+pub struct Solution {
+    /// The control mesh of the result.
+    pub result: PolyMesh,
+    /// The creases of the result.
+    pub creases: Creases,
+    /// The surface of the result.
+    pub surface: SubdivisionSurface,
+    /// The first level's control mesh before anything moved: quads, refined as far as needed.
+    pub initial: PolyMesh,
+    /// Its surface.
+    pub initial_surface: SubdivisionSurface,
+    /// All functionals of the first level's surface before anything moved.
+    pub before: EnergyTable,
+    /// All functionals of the result, by the fine quadrature; NaN if the run was stopped at once.
+    pub after: EnergyTable,
+    /// The numbers of the metrics file.
+    pub metrics: Metrics,
+    /// Limit of the energy for vanishing mesh size by Richardson's extrapolation of the last two
+    /// levels, whose errors are in ratio 4.
+    pub extrapolated: Option<f64>,
+    /// What the user should know.
+    pub warnings: Vec<Warning>,
+    /// What the solver did: a stage per level, named after its number of vertices; energies with the
+    /// pulls of [`crate::Constraints::weights`]. The status is `Stalled` in place of `Converged` if
+    /// the quadrature gap is above 1 %.
+    pub report: RunReport,
+    /// What every level was made of.
+    pub levels: Vec<LevelNumbers>,
+}
