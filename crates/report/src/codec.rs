@@ -116,6 +116,8 @@ fn octahedral(n: DVec3) -> [f64; 2] {
 
 #[cfg(test)]
 mod tests {
+    use proptest::prelude::*;
+
     use super::*;
 
     /// The page's decoder, in Rust.
@@ -193,5 +195,32 @@ mod tests {
         let mut packer = Packer::with_rows_of(columns);
         packer.floats((0..rows * columns).map(f));
         assert!(packer.into_text().len() < 2 * rows * columns);
+    }
+
+    proptest! {
+        #[test]
+        fn any_floats_come_back_to_a_step(
+            values in prop::collection::vec(prop_oneof![9 => -1e6..1e6_f64, 1 => Just(f64::NAN)], 1..80),
+            row in 0_usize..9,
+        ) {
+            let mut packer = Packer::with_rows_of(row);
+            let about = packer.floats(values.iter().copied());
+            let codes = unpack(&packer.bytes, &about["layout"]);
+            let (lo, span) = (about["lo"].as_f64().unwrap(), about["span"].as_f64().unwrap());
+            prop_assert_eq!(codes.len(), values.len());
+            for (code, value) in codes.iter().zip(&values) {
+                let got = lo + span * f64::from(*code) / f64::from(LEVELS - 1);
+                let near = (got - value).abs() <= 0.51 * span / f64::from(LEVELS - 1);
+                let kept = if value.is_nan() { *code == LEVELS } else { near };
+                prop_assert!(kept);
+            }
+        }
+
+        #[test]
+        fn any_integers_come_back(values in prop::collection::vec(any::<u32>(), 0..80), row in 0_usize..9) {
+            let mut packer = Packer::with_rows_of(row);
+            let about = packer.integers(&values);
+            prop_assert_eq!(unpack(&packer.bytes, &about["layout"]), values);
+        }
     }
 }

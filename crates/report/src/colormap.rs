@@ -3,6 +3,11 @@
 //! Each map runs through a few anchors in the OKLab space (Ottosson 2020), where equal steps look
 //! about equally large. Both maps change in lightness as well as in hue: the diverging one is
 //! lightest at zero, the sequential one grows lighter throughout, so a grey print can be read too.
+//!
+//! Roots and powers come from `libm`, so that a colour is the same on every machine; those of the
+//! standard library are the machine's own.
+
+use libm::{cbrt, cos, pow, sin};
 
 use crate::FieldScale;
 
@@ -57,7 +62,7 @@ pub(crate) fn group_colour(index: usize) -> [u8; 3] {
     let hue = 0.6 + index as f64 * std::f64::consts::TAU * 0.381_966_011_250_105;
     let lightness = [0.74, 0.60, 0.85][index % 3];
     let chroma = [0.095, 0.11, 0.075][index % 3];
-    from_oklab([lightness, chroma * hue.cos(), chroma * hue.sin()])
+    from_oklab([lightness, chroma * cos(hue), chroma * sin(hue)])
 }
 
 /// `#rrggbb`.
@@ -68,21 +73,21 @@ pub(crate) fn hex([r, g, b]: [u8; 3]) -> String {
 /// Linear light of an sRGB byte, 0 to 1 (IEC 61966-2-1).
 pub(crate) fn to_linear(byte: u8) -> f64 {
     let c = f64::from(byte) / 255.0;
-    if c <= 0.040_45 { c / 12.92 } else { ((c + 0.055) / 1.055).powf(2.4) }
+    if c <= 0.040_45 { c / 12.92 } else { pow((c + 0.055) / 1.055, 2.4) }
 }
 
 /// The sRGB byte nearest to linear light, clamped to 0 to 1.
 pub(crate) fn from_linear(c: f64) -> u8 {
     let c = c.clamp(0.0, 1.0);
-    let s = if c <= 0.003_130_8 { c * 12.92 } else { 1.055 * c.powf(1.0 / 2.4) - 0.055 };
+    let s = if c <= 0.003_130_8 { c * 12.92 } else { 1.055 * pow(c, 1.0 / 2.4) - 0.055 };
     (s * 255.0).round() as u8
 }
 
 fn to_oklab(rgb: [u8; 3]) -> [f64; 3] {
     let [r, g, b] = rgb.map(to_linear);
-    let l = (0.412_221_470_8 * r + 0.536_332_536_3 * g + 0.051_445_992_9 * b).cbrt();
-    let m = (0.211_903_498_2 * r + 0.680_699_545_1 * g + 0.107_396_956_6 * b).cbrt();
-    let s = (0.088_302_461_9 * r + 0.281_718_837_6 * g + 0.629_978_700_5 * b).cbrt();
+    let l = cbrt(0.412_221_470_8 * r + 0.536_332_536_3 * g + 0.051_445_992_9 * b);
+    let m = cbrt(0.211_903_498_2 * r + 0.680_699_545_1 * g + 0.107_396_956_6 * b);
+    let s = cbrt(0.088_302_461_9 * r + 0.281_718_837_6 * g + 0.629_978_700_5 * b);
     [
         0.210_454_255_3 * l + 0.793_617_785_0 * m - 0.004_072_046_8 * s,
         1.977_998_495_1 * l - 2.428_592_205_0 * m + 0.450_593_709_9 * s,
@@ -91,9 +96,10 @@ fn to_oklab(rgb: [u8; 3]) -> [f64; 3] {
 }
 
 fn from_oklab([l, a, b]: [f64; 3]) -> [u8; 3] {
-    let x = (l + 0.396_337_777_4 * a + 0.215_803_757_3 * b).powi(3);
-    let y = (l - 0.105_561_345_8 * a - 0.063_854_172_8 * b).powi(3);
-    let z = (l - 0.089_484_177_5 * a - 1.291_485_548_0 * b).powi(3);
+    let cube = |v: f64| v * v * v;
+    let x = cube(l + 0.396_337_777_4 * a + 0.215_803_757_3 * b);
+    let y = cube(l - 0.105_561_345_8 * a - 0.063_854_172_8 * b);
+    let z = cube(l - 0.089_484_177_5 * a - 1.291_485_548_0 * b);
     [
         from_linear(4.076_741_662_1 * x - 3.307_711_591_3 * y + 0.230_969_929_2 * z),
         from_linear(-1.268_438_004_6 * x + 2.609_757_401_1 * y - 0.341_319_396_5 * z),

@@ -6,7 +6,7 @@
 #[expect(missing_docs, reason = "the messages spell out every field")]
 pub enum ReportError {
     /// An array has not one value per vertex or triangle.
-    #[error("{what} has {found} entries for {expected} {of}; give one per {of}")]
+    #[error("{what} has {found} entries; give one per {of}, {expected} in all")]
     Length { what: String, of: &'static str, expected: usize, found: usize },
     /// A triangle names a vertex that does not exist.
     #[error("triangle {triangle} uses vertex {vertex} of {vertices}; number vertices from 0")]
@@ -15,7 +15,10 @@ pub enum ReportError {
     #[error("{what} {index} is ({x}, {y}, {z}); {mend}")]
     Vector { what: &'static str, index: usize, x: f64, y: f64, z: f64, mend: &'static str },
     /// A triangle belongs to a group without a name.
-    #[error("triangle {triangle} is in group {group} of {what}, which names {groups} groups")]
+    #[error(
+        "triangle {triangle} is in group {group} of {what}, which names {groups} groups; number \
+         groups from 0 and name each"
+    )]
     Group { what: String, triangle: usize, group: u32, groups: usize },
     /// Two parts of one view share an id.
     #[error("the view `{view}` already has `{id}`; give each field, group and line set its own id")]

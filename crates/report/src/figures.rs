@@ -1,11 +1,14 @@
 //! The plots and pictures of a report as files in memory.
 
+use std::collections::BTreeSet;
+
 use rayon::prelude::*;
 
 use crate::diagram::diagram_svg;
 use crate::energies::energies_svg;
 use crate::histogram::histogram_svg;
 use crate::picture::{Layer, picture_png};
+use crate::text::file_word;
 use crate::{Report, ReportError};
 
 /// A file in memory; the caller writes it.
@@ -66,28 +69,15 @@ impl Report {
     }
 }
 
-/// Lower-case letters, digits and single hyphens, for names of files.
-fn file_word(text: &str) -> String {
-    let mut word = String::new();
-    for c in text.to_lowercase().chars() {
-        if c.is_ascii_alphanumeric() {
-            word.push(c);
-        } else if !word.is_empty() && !word.ends_with('-') {
-            word.push('-');
-        }
-    }
-    let word = word.trim_end_matches('-');
-    if word.is_empty() { "view".to_owned() } else { word.to_owned() }
-}
-
 /// Two stages of one name must not overwrite each other's figures.
 fn number_duplicates(figures: &mut [Figure]) {
-    let mut seen = std::collections::BTreeMap::new();
+    let mut taken = BTreeSet::new();
     for figure in figures {
-        let count = seen.entry(figure.name.clone()).or_insert(0_usize);
-        *count += 1;
-        if let (2.., Some((stem, extension))) = (*count, figure.name.rsplit_once('.')) {
-            figure.name = format!("{stem}-{count}.{extension}");
+        let (stem, extension) = figure.name.rsplit_once('.').unwrap_or((&figure.name, ""));
+        let numbered = (2..).map(|count| format!("{stem}-{count}.{extension}"));
+        let mut names = std::iter::once(figure.name.clone()).chain(numbered);
+        if let Some(free) = names.find(|name| taken.insert(name.clone())) {
+            figure.name = free;
         }
     }
 }
@@ -97,16 +87,11 @@ mod tests {
     use super::*;
 
     #[test]
-    fn file_words_are_plain() {
-        assert_eq!(file_word("After (25x18)"), "after-25x18");
-        assert_eq!(file_word("κ"), "view");
-    }
-
-    #[test]
     fn equal_names_get_numbers() {
         let figure = |name: &str| Figure { name: name.into(), bytes: Vec::new() };
-        let mut figures = [figure("a.svg"), figure("a.svg"), figure("b.svg")];
+        let mut figures = ["a.svg", "a.svg", "b.svg", "a-2.svg", "a.svg"].map(figure);
         number_duplicates(&mut figures);
-        assert_eq!(figures.map(|f| f.name), ["a.svg", "a-2.svg", "b.svg"]);
+        let names = figures.map(|f| f.name);
+        assert_eq!(names, ["a.svg", "a-2.svg", "b.svg", "a-2-2.svg", "a-3.svg"]);
     }
 }

@@ -8,6 +8,7 @@ use crate::energies::energies_svg;
 use crate::histogram::histogram_svg;
 use crate::numbers::format_number;
 use crate::page_data::page_data;
+use crate::text::{escape, escape_script};
 use crate::{Report, SeamTable};
 
 const STYLE: &str = include_str!("viewer/style.css");
@@ -131,7 +132,7 @@ fn script() -> String {
     for (name, source) in SHADERS {
         shaders.insert(name.to_owned(), Value::from(source));
     }
-    let shaders = Value::Object(shaders).to_string().replace('<', "\\u003c");
+    let shaders = escape_script(&Value::Object(shaders));
     let parts = SCRIPTS.join("\n");
     format!(
         "<script>\n\"use strict\";\n(() => {{\nconst SHADERS = {shaders};\n{parts}\n{MAIN}}})();\n</script>\n"
@@ -246,24 +247,8 @@ fn seam_rows(report: &Report, seams: &SeamTable) -> String {
     text + "</tbody></table></div>"
 }
 
-/// Text made harmless for HTML content and attributes.
-pub(crate) fn escape(text: &str) -> String {
-    let mut safe = String::with_capacity(text.len());
-    for c in text.chars() {
-        match c {
-            '&' => safe.push_str("&amp;"),
-            '<' => safe.push_str("&lt;"),
-            '>' => safe.push_str("&gt;"),
-            '"' => safe.push_str("&quot;"),
-            '\'' => safe.push_str("&#39;"),
-            c => safe.push(c),
-        }
-    }
-    safe
-}
-
 /// A JSON block no text inside can end early.
 fn json_block(id: &str, value: &Value) -> String {
-    let text = value.to_string().replace('<', "\\u003c");
+    let text = escape_script(value);
     format!("<script type=\"application/json\" id=\"{id}\">{text}</script>")
 }

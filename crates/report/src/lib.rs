@@ -43,6 +43,9 @@
 //! threads, the command line) stand in one JSON block of the page, `<script id="run">`; the rest of the bytes depend
 //! on the data alone.
 
+mod border;
+mod camera;
+mod canvas;
 mod codec;
 mod colormap;
 mod diagram;
@@ -53,14 +56,17 @@ mod font;
 mod histogram;
 mod html;
 mod layers;
+mod legend;
 mod numbers;
 mod page_data;
+mod palette;
 mod picture;
 mod plots;
 mod raster;
 mod report;
 mod surface_view;
 mod svg;
+mod text;
 
 pub use error::ReportError;
 pub use figures::Figure;

@@ -1,9 +1,15 @@
-//! A z-buffer rasteriser with four samples per pixel, and flat drawing on the finished image.
+//! A z-buffer for shaded triangles, with four samples per pixel.
 
 use crate::colormap::{from_linear, to_linear};
 
-/// Samples per pixel along each side.
-const FINE: usize = 2;
+/// Samples per pixel.
+const FINE: usize = 4;
+/// Where they lie in the pixel: no two in a row or column, so that nearly level and nearly upright
+/// edges get five steps of grey, where a grid of two by two gives them three.
+const SAMPLES: [[f64; 2]; FINE] = [[0.125, 0.625], [0.375, 0.125], [0.625, 0.875], [0.875, 0.375]];
+/// How far outside a triangle, in barycentric weight, a sample still belongs to it, so that
+/// rounding opens no slit between neighbours.
+const RIM: f64 = -1e-9;
 
 /// A point of the image plane in pixels from the upper left, with 1/distance from the eye.
 #[derive(Clone, Copy, Debug)]
@@ -17,26 +23,26 @@ pub(crate) struct Projected {
 pub(crate) struct Raster {
     width: usize,
     height: usize,
-    colours: Vec<[u8; 3]>,
-    nearness: Vec<f32>,
+    colours: Vec<[[u8; 3]; FINE]>,
+    nearness: Vec<[f32; FINE]>,
 }
 
 impl Raster {
     /// An empty picture of `width` x `height` pixels.
     pub(crate) fn new(width: usize, height: usize, background: [u8; 3]) -> Self {
-        let (width, height) = (width * FINE, height * FINE);
-        let colours = vec![background; width * height];
-        Self { width, height, colours, nearness: vec![0.0; width * height] }
+        let pixels = width * height;
+        let (colours, nearness) = (vec![[background; FINE]; pixels], vec![[0.0; FINE]; pixels]);
+        Self { width, height, colours, nearness }
     }
 
-    /// Draws a triangle; `shade` gets perspective-correct weights of its corners.
+    /// Draws a triangle. `shade` gets perspective-correct weights of its corners, once for the
+    /// samples of a pixel that the triangle takes.
     pub(crate) fn triangle(
         &mut self,
         corners: [Projected; 3],
         shade: impl Fn([f64; 3]) -> [u8; 3],
     ) {
-        let fine = FINE as f64;
-        let [a, b, c] = corners.map(|p| [p.x * fine, p.y * fine]);
+        let [a, b, c] = corners.map(|p| [p.x, p.y]);
         let cross = |p: [f64; 2], q: [f64; 2], r: [f64; 2]| {
             (q[0] - p[0]) * (r[1] - p[1]) - (q[1] - p[1]) * (r[0] - p[0])
         };
@@ -44,147 +50,76 @@ impl Raster {
         if !(area.abs() > 0.0) {
             return;
         }
+        let weights =
+            |p: [f64; 2]| [cross(b, c, p) / area, cross(c, a, p) / area, cross(a, b, p) / area];
+        // Weights are linear in the plane: what a sample adds to those at its pixel's corner.
+        let at_origin = weights([0.0; 2]);
+        let added = SAMPLES.map(|offset| {
+            let there = weights(offset);
+            [0, 1, 2].map(|i| there[i] - at_origin[i])
+        });
         let range = |k: usize, size: usize| {
             let (lo, hi) = (a[k].min(b[k]).min(c[k]), a[k].max(b[k]).max(c[k]));
-            (lo - 0.5).ceil().max(0.0) as usize..((hi + 0.5).max(0.0) as usize).min(size)
-        };
-        for y in range(1, self.height) {
-            for x in range(0, self.width) {
-                let p = [x as f64 + 0.5, y as f64 + 0.5];
-                let flat = [cross(b, c, p) / area, cross(c, a, p) / area, cross(a, b, p) / area];
-                if flat.iter().any(|w| *w < 0.0) {
-                    continue;
-                }
-                let near = [0, 1, 2].map(|i| flat[i] * corners[i].nearness);
-                let sum = near[0] + near[1] + near[2];
-                let at = y * self.width + x;
-                if sum as f32 > self.nearness[at] {
-                    self.nearness[at] = sum as f32;
-                    self.colours[at] = shade(near.map(|w| w / sum));
-                }
-            }
-        }
-    }
-
-    /// Draws a straight line `width` pixels wide over what is not nearer than it by more than the
-    /// share `bias`.
-    pub(crate) fn segment(
-        &mut self,
-        [a, b]: [Projected; 2],
-        width: f64,
-        colour: [u8; 3],
-        alpha: f64,
-        bias: f64,
-    ) {
-        let fine = FINE as f64;
-        let (p, q) = ([a.x * fine, a.y * fine], [b.x * fine, b.y * fine]);
-        let reach = 0.5 * width * fine;
-        let range = |k: usize, size: usize| {
-            let (lo, hi) = (p[k].min(q[k]) - reach, p[k].max(q[k]) + reach);
             lo.max(0.0) as usize..((hi + 1.0).max(0.0) as usize).min(size)
         };
         for y in range(1, self.height) {
             for x in range(0, self.width) {
-                let (t, distance) = foot([x as f64 + 0.5, y as f64 + 0.5], p, q);
-                if distance > reach {
-                    continue;
-                }
-                let near = a.nearness + (b.nearness - a.nearness) * t;
-                let at = y * self.width + x;
-                if near * (1.0 + bias) >= f64::from(self.nearness[at]) {
-                    self.colours[at] = mix(self.colours[at], colour, alpha);
-                }
-            }
-        }
-    }
-
-    /// Averages the samples of each pixel in linear light.
-    pub(crate) fn finish(self) -> Image {
-        let linear: Vec<f64> = (0..=255).map(to_linear).collect();
-        let (width, height) = (self.width / FINE, self.height / FINE);
-        let mut pixels = Vec::with_capacity(width * height);
-        for y in 0..height {
-            for x in 0..width {
-                let mut sum = [0.0; 3];
-                for dy in 0..FINE {
-                    for dx in 0..FINE {
-                        let c = self.colours[(y * FINE + dy) * self.width + x * FINE + dx];
-                        for k in 0..3 {
-                            sum[k] += linear[usize::from(c[k])];
-                        }
+                let at_corner = weights([x as f64, y as f64]);
+                let pixel = y * self.width + x;
+                let (mut taken, mut sum) = ([false; FINE], [0.0; 3]);
+                for (s, added) in added.iter().enumerate() {
+                    let flat = [0, 1, 2].map(|i| at_corner[i] + added[i]);
+                    if flat.iter().any(|w| *w < RIM) {
+                        continue;
+                    }
+                    let near = [0, 1, 2].map(|i| flat[i] * corners[i].nearness);
+                    let nearness = (near[0] + near[1] + near[2]) as f32;
+                    if nearness > self.nearness[pixel][s] {
+                        self.nearness[pixel][s] = nearness;
+                        taken[s] = true;
+                        sum = [0, 1, 2].map(|i| sum[i] + near[i]);
                     }
                 }
-                let first = self.colours[y * FINE * self.width + x * FINE];
-                // Most pixels are of one colour or empty; the root is for edges alone.
-                let mean = sum.map(|s| s / (FINE * FINE) as f64);
-                let flat = (0..3).all(|k| mean[k] == linear[usize::from(first[k])]);
-                pixels.push(if flat { first } else { mean.map(from_linear) });
-            }
-        }
-        Image { width, height, pixels }
-    }
-}
-
-/// A finished picture that labels are drawn on.
-pub(crate) struct Image {
-    pub(crate) width: usize,
-    pub(crate) height: usize,
-    pixels: Vec<[u8; 3]>,
-}
-
-impl Image {
-    /// Fills the pixels from `corner` on.
-    pub(crate) fn fill(&mut self, corner: [usize; 2], size: [usize; 2], colour: [u8; 3]) {
-        for y in corner[1]..(corner[1] + size[1]).min(self.height) {
-            for x in corner[0]..(corner[0] + size[0]).min(self.width) {
-                self.pixels[y * self.width + x] = colour;
-            }
-        }
-    }
-
-    /// Draws polylines with round ends; where they cross they do not get darker.
-    pub(crate) fn strokes(&mut self, lines: &[Vec<[f64; 2]>], width: f64, colour: [u8; 3]) {
-        let reach = 0.5 * width + 0.5;
-        let corners = || lines.iter().flatten();
-        let range = |k: usize, size: usize| {
-            let lo = corners().map(|p| p[k]).fold(f64::INFINITY, f64::min) - reach;
-            let hi = corners().map(|p| p[k]).fold(f64::NEG_INFINITY, f64::max) + reach;
-            lo.max(0.0) as usize..((hi + 1.0).max(0.0) as usize).min(size)
-        };
-        for y in range(1, self.height) {
-            for x in range(0, self.width) {
-                let p = [x as f64 + 0.5, y as f64 + 0.5];
-                let segments = lines.iter().flat_map(|l| l.windows(2));
-                let distances = segments.map(|s| foot(p, s[0], s[1]).1);
-                let cover = (reach - distances.fold(f64::INFINITY, f64::min)).clamp(0.0, 1.0);
-                if cover > 0.0 {
-                    let pixel = &mut self.pixels[y * self.width + x];
-                    *pixel = mix(*pixel, colour, cover);
+                let total = sum[0] + sum[1] + sum[2];
+                if total > 0.0 {
+                    let colour = shade(sum.map(|w| w / total));
+                    for s in (0..FINE).filter(|s| taken[*s]) {
+                        self.colours[pixel][s] = colour;
+                    }
                 }
             }
         }
     }
 
-    /// The pixels row by row, three bytes each.
-    pub(crate) fn bytes(&self) -> Vec<u8> {
-        self.pixels.concat()
+    /// Whether nothing lies in front of `point` by more than the share `bias` at one of the samples
+    /// within a pixel of it: a surface seen edge-on is in front of its own border half a pixel on.
+    pub(crate) fn shows(&self, point: Projected, bias: f64) -> bool {
+        let near = point.nearness * (1.0 + bias);
+        let around = |at: f64, size: usize| {
+            let inside = |v: f64| (v.max(0.0) as usize).min(size);
+            inside(at - 0.5)..inside(at + 1.5)
+        };
+        around(point.y, self.height).any(|y| {
+            let row = &self.nearness[y * self.width..(y + 1) * self.width];
+            row[around(point.x, self.width)].iter().flatten().any(|n| near >= f64::from(*n))
+        })
     }
-}
 
-/// Parameter and distance of the point of a segment nearest to `p`.
-fn foot(p: [f64; 2], a: [f64; 2], b: [f64; 2]) -> (f64, f64) {
-    let along = [b[0] - a[0], b[1] - a[1]];
-    let square = along[0] * along[0] + along[1] * along[1];
-    let dot = (p[0] - a[0]) * along[0] + (p[1] - a[1]) * along[1];
-    let t = if square > 0.0 { (dot / square).clamp(0.0, 1.0) } else { 0.0 };
-    (t, (p[0] - a[0] - t * along[0]).hypot(p[1] - a[1] - t * along[1]))
-}
-
-fn mix(a: [u8; 3], b: [u8; 3], t: f64) -> [u8; 3] {
-    [0, 1, 2].map(|k| {
-        let (x, y) = (f64::from(a[k]), f64::from(b[k]));
-        (x + (y - x) * t).round() as u8
-    })
+    /// The pixels row by row, each the mean of its samples in linear light.
+    pub(crate) fn pixels(&self) -> Vec<[u8; 3]> {
+        let linear: Vec<f64> = (0..=255).map(to_linear).collect();
+        let mean = |samples: &[[u8; 3]; FINE]| {
+            // Most pixels are of one colour; the root is for edges alone.
+            if samples[1..].iter().all(|s| *s == samples[0]) {
+                return samples[0];
+            }
+            [0, 1, 2].map(|k| {
+                let sum: f64 = samples.iter().map(|s| linear[usize::from(s[k])]).sum();
+                from_linear(sum / FINE as f64)
+            })
+        };
+        self.colours.iter().map(mean).collect()
+    }
 }
 
 #[cfg(test)]
@@ -212,7 +147,7 @@ mod tests {
             for (nearness, colour) in parts {
                 square(&mut raster, nearness, colour);
             }
-            assert!(raster.finish().bytes().chunks(3).all(|p| p == [200, 0, 0]));
+            assert!(raster.pixels().into_iter().all(|p| p == [200, 0, 0]));
         }
     }
 
@@ -224,7 +159,32 @@ mod tests {
         raster.triangle(left, |_| [255; 3]);
         raster.triangle([corner(0.0, -1.0), corner(0.5, 3.0), corner(0.0, 3.0)], |_| [255; 3]);
         // Half the light is the sRGB byte 188.
-        assert_eq!(raster.finish().bytes(), [188; 3]);
+        assert_eq!(raster.pixels(), [[188; 3]]);
+    }
+
+    #[test]
+    fn a_fan_of_triangles_has_no_slits_and_no_sample_twice() {
+        let mut raster = Raster::new(40, 40, [0; 3]);
+        let rim = |k: usize| {
+            let angle = k as f64 * std::f64::consts::TAU / 17.0;
+            Projected { x: 20.3 + 60.0 * angle.cos(), y: 19.6 + 60.0 * angle.sin(), nearness: 1.0 }
+        };
+        let middle = Projected { x: 20.3, y: 19.6, nearness: 1.0 };
+        for k in 0..17 {
+            raster.triangle([middle, rim(k), rim(k + 1)], |_| [255; 3]);
+        }
+        assert!(raster.pixels().into_iter().all(|p| p == [255; 3]));
+    }
+
+    #[test]
+    fn a_triangle_takes_as_many_samples_as_its_area() {
+        let mut raster = Raster::new(200, 150, [0; 3]);
+        let corner = |x: f64, y: f64| Projected { x, y, nearness: 1.0 };
+        raster
+            .triangle([corner(13.2, 11.7), corner(190.1, 40.3), corner(60.6, 140.9)], |_| [255; 3]);
+        let light: f64 = raster.pixels().iter().map(|p| to_linear(p[0])).sum();
+        let area = 0.5 * ((190.1 - 13.2) * (140.9 - 11.7) - (40.3 - 11.7) * (60.6 - 13.2));
+        assert!((light / area - 1.0).abs() < 2e-3, "{light} {area}");
     }
 
     #[test]
@@ -244,11 +204,15 @@ mod tests {
     }
 
     #[test]
-    fn strokes_cover_their_line() {
-        let mut image = Raster::new(9, 9, [255; 3]).finish();
-        image.strokes(&[vec![[1.0, 4.5], [8.0, 4.5]]], 1.0, [0; 3]);
-        let bytes = image.bytes();
-        assert_eq!(bytes[(4 * 9 + 4) * 3], 0);
-        assert_eq!(bytes[(2 * 9 + 4) * 3], 255);
+    fn points_show_unless_something_is_in_front_all_around() {
+        let mut raster = Raster::new(12, 8, [9; 3]);
+        square(&mut raster, NEAR, [200, 0, 0]);
+        let at = |x: f64, nearness: f64| Projected { x, y: 4.0, nearness };
+        assert!(raster.shows(at(4.0, NEAR), 1e-3) && raster.shows(at(4.0, NEAR + 0.1), 0.0));
+        assert!(!raster.shows(at(4.0, FAR), 1e-3));
+        // Beside the square, on its rim, and outside the picture nothing is in front.
+        assert!(raster.shows(at(11.0, FAR), 0.0) && raster.shows(at(7.9, FAR), 0.0));
+        assert!(!raster.shows(at(7.4, FAR), 0.0));
+        assert!(!raster.shows(at(-50.0, NEAR), 0.0) && !raster.shows(at(1e9, NEAR), 0.0));
     }
 }

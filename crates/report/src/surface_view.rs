@@ -241,7 +241,10 @@ mod tests {
         };
         let index = refused(&p, &n, vec![[0, 1, 3]]);
         assert_eq!(index, "triangle 0 uses vertex 3 of 3; number vertices from 0");
-        assert!(refused(&p, &n[..2], vec![[0, 1, 2]]).contains("2 entries for 3 vertex"));
+        assert!(
+            refused(&p, &n[..2], vec![[0, 1, 2]])
+                .contains("2 entries; give one per vertex, 3 in all")
+        );
         assert!(refused(&p, &[DVec3::Z * 2.0; 3], vec![[0, 1, 2]]).contains("length 1"));
         assert!(refused(&[DVec3::NAN; 3], &n, vec![[0, 1, 2]]).contains("position 0 is (NaN"));
         assert!(refused(&p, &n, vec![]).contains("no triangles"));

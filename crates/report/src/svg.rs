@@ -2,7 +2,8 @@
 
 use std::fmt::{Display, Write as _};
 
-use crate::html::escape;
+use crate::font::Lettering;
+use crate::text::escape;
 
 pub(crate) const INK: &str = "#1b2129";
 pub(crate) const SOFT: &str = "#5d6673";
@@ -13,6 +14,23 @@ pub(crate) const MARK: &str = "#b3123f";
 /// Colours of the series of a plot, told apart by lightness as well as by hue.
 pub(crate) const SERIES: [&str; 6] =
     ["#8a93a3", "#1f5fa8", "#d9782d", "#2b8c82", "#7a3e8f", "#b89b1f"];
+
+/// Size of the font of text that is not said to have another.
+pub(crate) const TEXT: f64 = 11.5;
+
+/// Width of a text in the reader's font against that in ours: the common ones are up to so much
+/// wider.
+const WIDER: f64 = 1.1;
+
+/// Room that a text of size `size` takes in whatever font the reader has.
+pub(crate) fn text_room(text: &str, size: f64) -> f64 {
+    WIDER * Lettering::regular(size).width(text)
+}
+
+/// The text if it fits into `room`, else its beginning with `…` after it.
+pub(crate) fn cut(text: &str, size: f64, room: f64) -> String {
+    Lettering::regular(size).cut(text, room / WIDER)
+}
 
 /// Where a piece of text is anchored.
 #[derive(Clone, Copy)]
@@ -92,7 +110,7 @@ impl Svg {
     }
 
     pub(crate) fn text(&mut self, [x, y]: [f64; 2], anchor: Anchor, fill: &str, text: &str) {
-        self.sized_text([x, y], anchor, fill, 11.5, text);
+        self.sized_text([x, y], anchor, fill, TEXT, text);
     }
 
     pub(crate) fn sized_text(
@@ -110,17 +128,26 @@ impl Svg {
         ));
     }
 
+    /// The name of what follows.
+    pub(crate) fn bold_text(&mut self, [x, y]: [f64; 2], size: f64, text: &str) {
+        let text = escape(text);
+        self.push(format_args!(
+            "<text x=\"{x:.1}\" y=\"{y:.1}\" font-size=\"{size}\" font-weight=\"600\" \
+             fill=\"{INK}\">{text}</text>"
+        ));
+    }
+
     /// Text that runs upwards.
     pub(crate) fn upward_text(&mut self, [x, y]: [f64; 2], fill: &str, text: &str) {
         let text = escape(text);
         self.push(format_args!(
             "<text transform=\"translate({x:.1} {y:.1}) rotate(-90)\" text-anchor=\"middle\" \
-             fill=\"{fill}\" font-size=\"11.5\">{text}</text>"
+             fill=\"{fill}\" font-size=\"{TEXT}\">{text}</text>"
         ));
     }
 
     /// Adds markup as it is.
-    pub(crate) fn push(&mut self, markup: impl Display) {
+    fn push(&mut self, markup: impl Display) {
         let _ = writeln!(self.body, "{markup}");
     }
 
