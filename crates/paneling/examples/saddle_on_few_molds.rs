@@ -2,9 +2,8 @@
 //! keep every kink within one degree; writes the second as `saddle.obj` with a colour per mold.
 #![allow(clippy::print_stdout, reason = "an example")]
 
-use exchange::{Group, Mesh, write_files, write_obj_and_materials};
 use paneling::{Counts, Options, Solution, solve};
-use std::path::Path;
+use std::fmt::Write;
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let surface = fixtures::surfaces::Shape::Saddle.surface(10, 10, 4, 4);
@@ -23,29 +22,33 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
             solution.report.status,
         );
     }
-    let [panels, materials] = write_obj_and_materials(&[mesh(&few)], "saddle.mtl");
-    write_files(&[
-        (Path::new("saddle.obj"), panels.as_bytes()),
-        (Path::new("saddle.mtl"), materials.as_bytes()),
-    ])?;
+    let (panels, colours) = obj(&few)?;
+    std::fs::write("saddle.obj", panels)?;
+    std::fs::write("saddle.mtl", colours)?;
     println!("written: saddle.obj, saddle.mtl");
     Ok(())
 }
 
-/// All panels as triangles on their molds, a group per mold.
-fn mesh(solution: &Solution) -> Mesh {
+/// All panels as triangles on their molds, and a colour per mold.
+fn obj(solution: &Solution) -> Result<(String, String), std::fmt::Error> {
     let paneling = &solution.result;
-    let mut mesh = Mesh { name: "panels".into(), ..Mesh::default() };
-    mesh.groups = (0..paneling.molds.len()).map(|m| Group::new(format!("mold-{m}"))).collect();
-    for (p, &mold) in paneling.labels.iter().enumerate() {
-        let panel = paneling.panel_mesh(&solution.panels, p);
-        let first = mesh.positions.len() as u32;
-        mesh.positions.extend(panel.positions);
-        mesh.normals.extend(panel.normals);
-        for triangle in panel.triangles {
-            mesh.faces.push(&triangle.map(|v| first + v));
-            mesh.face_groups.push(mold as u32);
-        }
+    let (mut panels, mut colours) = (String::from("mtllib saddle.mtl\n"), String::new());
+    for m in 0..paneling.molds.len() {
+        // Hues a golden angle apart, so that neighbouring numbers look different.
+        let [r, g, b] = [0.0, 2.1, 4.2].map(|phase| 0.6 + 0.35 * (2.4 * m as f64 + phase).sin());
+        writeln!(colours, "newmtl mold-{m}\nKd {r:.3} {g:.3} {b:.3}")?;
     }
-    mesh
+    let mut first = 1;
+    for (p, mold) in paneling.labels.iter().enumerate() {
+        let mesh = paneling.panel_mesh(&solution.panels, p);
+        writeln!(panels, "usemtl mold-{mold}")?;
+        for v in &mesh.positions {
+            writeln!(panels, "v {} {} {}", v.x, v.y, v.z)?;
+        }
+        for [a, b, c] in mesh.triangles {
+            writeln!(panels, "f {} {} {}", first + a, first + b, first + c)?;
+        }
+        first += mesh.positions.len() as u32;
+    }
+    Ok((panels, colours))
 }

@@ -55,7 +55,7 @@ pub enum Error {
     SeveralRules,
     /// Several types of molds and nothing to choose by.
     #[error(
-        "several `mold_types` need bounds to choose by; add `max_kink_deg` or `max_gap`, or keep one"
+        "several mold types need bounds to choose by; add `max_kink_deg` or `max_gap`, or keep one of `mold_types`"
     )]
     SeveralTypes,
     /// A number of panels for a layout that has its own.

@@ -72,8 +72,8 @@ pub fn solve<'a>(
 /// lengths in the unit of the [`Stage`], the panel size.
 ///
 /// Where `extra` changes nothing, seam steps are those of [`solve`]. Otherwise they are steps of
-/// Levenberg-Marquardt on the problem, which forms and factors its matrix: fine for some thousand
-/// panels.
+/// Levenberg-Marquardt on the problem, which forms and factors its matrix: fine for some hundred
+/// panels, and with gp-solver's feature `sparse` for some thousand.
 ///
 /// # Errors
 /// As [`solve`], and whatever `extra` returns.

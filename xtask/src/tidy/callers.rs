@@ -23,13 +23,8 @@ const KEPT: &[(&str, &str)] = &[
 
 /// Items whose callers in the methods are on their way; this list may only become shorter.
 const EXPECTED: &[&str] = &[
-    "Attempt",
     "BandCholesky",
-    "BlockId",
-    "DampedModel",
-    "DampingPolicy",
     "EnergyBlock",
-    "IterationRecord",
     "MultifrontalCholesky",
     "QpSolution",
     "Regularization",
