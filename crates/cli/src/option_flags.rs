@@ -46,9 +46,8 @@ impl<O: Fields> OptionFlags<O> {
 
     /// The file given in place of a value, for options that take one.
     pub(crate) fn file(&self, name: &str) -> Option<&Path> {
-        let given = self.given.iter().find(|(field, text)| {
-            field.name == name && is_file(field.name, text)
-        });
+        let given =
+            self.given.iter().find(|(field, text)| field.name == name && is_file(field.name, text));
         given.map(|(_, text)| Path::new(text))
     }
 }

@@ -7,45 +7,6 @@ use paneling::{FlatPanel, FlatSheets, Mold, PanelRow, PanelSet, Paneling};
 use serde::Serialize;
 use std::path::{Path, PathBuf};
 
-/// How well the panels of one paneling meet.
-#[derive(Serialize)]
-pub(crate) struct Quality {
-    pub(crate) panels: usize,
-    pub(crate) molds: usize,
-    pub(crate) kink_median_deg: f64,
-    pub(crate) kink_p95_deg: f64,
-    pub(crate) kink_max_deg: f64,
-    pub(crate) gap_median: f64,
-    pub(crate) gap_p95: f64,
-    pub(crate) gap_max: f64,
-    pub(crate) gap_median_percent: f64,
-    pub(crate) gap_p95_percent: f64,
-    pub(crate) gap_max_percent: f64,
-    pub(crate) deviation_max_percent: f64,
-}
-
-impl Quality {
-    /// The measures of `paneling` in degrees, model units, and percent of the diagonal.
-    pub(crate) fn new(set: &PanelSet, paneling: &Paneling) -> Self {
-        let (kinks, gaps) = (paneling.measures.kinks, paneling.measures.gaps);
-        let percent = |length: f64| set.percent_of_diagonal(length);
-        Self {
-            panels: set.len(),
-            molds: paneling.molds.len(),
-            kink_median_deg: kinks.median.to_degrees(),
-            kink_p95_deg: kinks.p95.to_degrees(),
-            kink_max_deg: kinks.max.to_degrees(),
-            gap_median: gaps.median,
-            gap_p95: gaps.p95,
-            gap_max: gaps.max,
-            gap_median_percent: percent(gaps.median),
-            gap_p95_percent: percent(gaps.p95),
-            gap_max_percent: percent(gaps.max),
-            deviation_max_percent: percent(paneling.measures.max_deviation()),
-        }
-    }
-}
-
 /// The RON form of a paneling.
 #[derive(Serialize)]
 struct PanelingFile<'a> {

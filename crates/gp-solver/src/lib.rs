@@ -90,7 +90,10 @@ pub use fields::{Counts, Field, Fields, List, ListItem, OptionValue};
 pub use lbfgs::{Euclidean, LbfgsOptions, Metric, Objective, lbfgs};
 pub use least_squares::{Run, Step, StepModel, System, Triplets, solve, solve_observed};
 pub use line_search::LineSearch;
-pub use linear::{BandCholesky, SymmetricPattern};
+pub use linear::{
+    BandCholesky, CgOptions, CgReport, ConjugateGradients, LinearOperator, Preconditioner,
+    SymmetricPattern,
+};
 #[cfg(feature = "sparse")]
 pub use linear::{MultifrontalCholesky, SparseCholesky};
 #[cfg(feature = "sparse")]

@@ -3,7 +3,11 @@
 
 use criterion::{BenchmarkId, Criterion, criterion_group, criterion_main};
 use fixtures::surfaces::{Shape, plane};
-use paneling::{Layout, Options, PanelSet, Pattern, mold_count, panel};
+use paneling::{Layout, MoldType, Options, PanelSet, Pattern, mold_count, solve};
+
+fn options(molds: usize) -> Options {
+    Options { compare_grid: false, ..Options::with_molds(molds, MoldType::Cubic) }
+}
 
 fn panels(c: &mut Criterion) {
     let mut group = c.benchmark_group("panels");
@@ -16,7 +20,7 @@ fn panels(c: &mut Criterion) {
                 let layout = Layout::generate(Pattern::Quad, side, side, [false; 2]).unwrap();
                 let set = PanelSet::new(&roof, &layout).unwrap();
                 let molds = mold_count(3.0, set.len());
-                panel(&set, &Options { seam_steps, ..Options::with_molds(molds) }).unwrap()
+                solve(&set, &Options { seam_steps, ..options(molds) }, &mut ()).unwrap()
             });
         });
     }
@@ -26,7 +30,7 @@ fn panels(c: &mut Criterion) {
         b.iter(|| {
             let layout = Layout::generate(Pattern::Quad, 30, 30, [false; 2]).unwrap();
             let set = PanelSet::new(&flat, &layout).unwrap();
-            panel(&set, &Options::with_molds(90)).unwrap()
+            solve(&set, &options(90), &mut ()).unwrap()
         });
     });
     group.finish();

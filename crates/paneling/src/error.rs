@@ -4,7 +4,7 @@
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 #[expect(missing_docs, reason = "the messages spell out every field")]
-pub enum PanelingError {
+pub enum Error {
     /// A layout with no panels in one direction.
     #[error("a layout of {u} x {v} panels has none; ask for at least 1 x 1")]
     NoPanels { u: usize, v: usize },
@@ -47,9 +47,20 @@ pub enum PanelingError {
         "the surface is singular at ({u}, {v}), inside panel {panel}; cut the pole off or move its control points apart"
     )]
     Singular { panel: usize, u: f64, v: f64 },
-    /// A bound that no paneling can be measured against.
-    #[error("{name} is {value}; it must be positive and finite")]
+    /// An option without meaning, such as a bound that no paneling can be measured against.
+    #[error("`{name}` is {value}; it must be positive and finite")]
     BadOption { name: &'static str, value: f64 },
+    /// More than one rule for the number of molds.
+    #[error("`k`, `molds` and the bounds `max_kink_deg`, `max_gap` exclude one another; keep one")]
+    SeveralRules,
+    /// Several types of molds and nothing to choose by.
+    #[error(
+        "several mold types need bounds to choose by; add `max_kink_deg` or `max_gap`, or keep one of `mold_types`"
+    )]
+    SeveralTypes,
+    /// A number of panels for a layout that has its own.
+    #[error("`panels` has no meaning with a layout of one's own; drop one of the two")]
+    PanelsWithLayout,
     /// A flat panel that does not fit on a sheet.
     #[error(
         "panel {panel} needs {} x {} of sheet with its margins, but a sheet is {} x {}; take a larger sheet or smaller panels",
@@ -58,7 +69,7 @@ pub enum PanelingError {
     SheetTooSmall { panel: usize, size: [f64; 2], sheet: [f64; 2] },
     /// No type of mold was allowed.
     #[error(
-        "no mold type is allowed; name at least one of plane, cylinder, sphere, paraboloid, torus, cubic"
+        "`mold_types` is empty; name at least one of plane, cylinder, sphere, paraboloid, torus, cubic"
     )]
     NoMoldTypes,
     /// A price list without a type that is allowed.
@@ -67,4 +78,7 @@ pub enum PanelingError {
     /// A price that is not a number or below zero.
     #[error("the price of {kind} is {value}; prices must be finite and not negative")]
     BadPrice { kind: &'static str, value: f64 },
+    /// The solver refuses a block of the caller's, or a checkpoint.
+    #[error(transparent)]
+    Solver(#[from] gp_solver::SolverError),
 }

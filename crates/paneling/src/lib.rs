@@ -3,38 +3,50 @@
 //! (Pellis et al. 2021, Sec. 4.2).
 //!
 //! A [`Layout`] of polygons over the unit square is mapped to a surface, which gives a
-//! [`PanelSet`]; [`panel`] clusters it for a given number of molds, [`panel_within`] finds the
-//! cheapest molds that keep given bounds; the [`Paneling`] has molds, poses and [`Measures`].
+//! [`PanelSet`]; [`solve`] groups it for a given number of molds, or finds the cheapest molds that
+//! keep given bounds ([`Options`]); the [`Solution`] has molds, poses and measures, and everything a
+//! workshop needs ([`Paneling`]). [`solve_with`] takes residual rows of one's own along;
+//! [`blocks`] has those of the joint seam step.
 //!
 //! # Example
 //! ```
-//! use paneling::{Layout, Options, PanelSet, Pattern, mold_count, panel};
+//! use paneling::{Counts, Options, solve};
 //! let surface = fixtures::surfaces::Shape::Saddle.surface(10, 10, 4, 4);
-//! let layout = Layout::generate(Pattern::Quad, 10, 10, [false, false])?;
-//! let panels = PanelSet::new(&surface, &layout)?;
-//! let result = panel(&panels, &Options::with_molds(mold_count(2.0, panels.len())))?;
-//! assert_eq!(result.molds.len(), 20);
-//! assert!(result.measures.kinks.median.to_degrees() < 0.4);
-//! # Ok::<(), paneling::PanelingError>(())
+//! let options = Options { panels: Some(Counts { u: 10, v: 10 }), k: Some(2.0), ..Options::default() };
+//! let solution = solve(&surface, &options, &mut ())?;
+//! assert_eq!(solution.result.molds.len(), 20);
+//! assert!(solution.metrics.quality.kink_median_deg < 0.4);
+//! # Ok::<(), paneling::Error>(())
 //! ```
 
+pub mod blocks;
 mod error;
 mod fit;
+mod input;
 mod layout;
+mod metrics;
 mod mold;
+mod options;
 mod output;
 mod paneling;
+mod pulse;
 mod seam;
 mod search;
+mod solve;
 
-pub use error::PanelingError;
+pub use blocks::variables;
+pub use error::Error;
 pub use fit::clustering::DiagramAxis;
+pub use gp_solver::{Counts, List};
+pub use input::Input;
 pub use layout::panels::{PanelSet, Pose, SEAM_SAMPLES, Seam};
 pub use layout::tiling::{Layout, MAX_PANELS, Pattern};
+pub use metrics::{Metrics, Quality};
 pub use mold::prices::{Price, PriceList};
 pub use mold::shape::{Mold, MoldType};
+pub use options::{Clustering, Options, SheetSize, mold_count};
 pub use output::outline::{Bend, FlatPanel, FlatSheets};
 pub use output::workshop::{PanelMesh, PanelRow};
-pub use paneling::{Clustering, Options, Paneling, mold_count, panel};
+pub use paneling::Paneling;
 pub use seam::measure::{Measures, SeamMeasure, Spread};
-pub use search::{Bounded, Bounds, panel_within};
+pub use solve::{Solution, problem, solve, solve_with};

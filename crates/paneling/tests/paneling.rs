@@ -6,8 +6,8 @@ use bspline::BsplineSurface;
 use fixtures::surfaces::{Shape, plane, sphere_cap};
 use geom_core::{DVec3, assert_close};
 use paneling::{
-    Bounds, Clustering, DiagramAxis, Layout, MoldType, Options, PanelSet, Paneling, PanelingError,
-    Pattern, PriceList, mold_count, panel, panel_within,
+    Clustering, Error, Layout, List, MoldType, Options, PanelSet, Paneling, Pattern, Price,
+    PriceList, Solution, mold_count, solve,
 };
 
 fn panels(surface: &BsplineSurface, pattern: Pattern, u: usize, v: usize) -> PanelSet {
@@ -15,8 +15,16 @@ fn panels(surface: &BsplineSurface, pattern: Pattern, u: usize, v: usize) -> Pan
     PanelSet::new(surface, &Layout::generate(pattern, u, v, closed).unwrap()).unwrap()
 }
 
-fn with_type(molds: usize, mold_type: MoldType) -> Options {
-    Options { mold_type, ..Options::with_molds(molds) }
+fn with_type(molds: usize, kind: MoldType) -> Options {
+    Options { compare_grid: false, ..Options::with_molds(molds, kind) }
+}
+
+fn with_molds(molds: usize) -> Options {
+    with_type(molds, MoldType::Cubic)
+}
+
+fn panel(set: &PanelSet, options: &Options) -> Result<Paneling, Error> {
+    solve(set, options, &mut ()).map(|s| s.result)
 }
 
 fn roof(n: usize) -> PanelSet {
@@ -124,7 +132,7 @@ fn cylinders_and_paraboloids_are_fitted_exactly() {
 #[test]
 fn molds_stay_about_three_panels_wide() {
     let set = roof(20);
-    let result = panel(&set, &Options::with_molds(20)).unwrap();
+    let result = panel(&set, &with_molds(20)).unwrap();
     let table = result.table(&set);
     let breadth = |row: &paneling::PanelRow| row.extent[1] - row.extent[0];
     let widest = table.iter().map(breadth).fold(0.0, f64::max);
@@ -139,7 +147,7 @@ fn every_pattern_can_be_panelled_on_open_and_closed_surfaces() {
     for surface in [Shape::Saddle.surface(10, 10, 4, 4), Shape::Tube.surface(14, 12, 4, 4)] {
         for pattern in Pattern::ALL {
             let set = panels(&surface, pattern, 8, 8);
-            let result = panel(&set, &Options::with_molds(mold_count(2.0, set.len()))).unwrap();
+            let result = panel(&set, &with_molds(mold_count(2.0, set.len()))).unwrap();
             let kinks = result.measures.kinks;
             assert!(kinks.max < 0.2 && kinks.median > 0.0, "{pattern:?}: {kinks:?}");
             let open = usize::from(!surface.knots_u().is_periodic()) + 1;
@@ -155,7 +163,7 @@ fn every_pattern_can_be_panelled_on_open_and_closed_surfaces() {
 #[test]
 fn energies_never_rise() {
     let set = roof(12);
-    let result = panel(&set, &Options::with_molds(20)).unwrap();
+    let result = panel(&set, &with_molds(20)).unwrap();
     for history in [&result.fit_history, &result.seam_history] {
         assert!(history.len() > 1);
         assert!(history.windows(2).all(|e| e[1] <= e[0] * (1.0 + 1e-12)), "{history:?}");
@@ -166,10 +174,10 @@ fn energies_never_rise() {
 fn the_joint_seam_step_lowers_kinks_and_gaps() {
     let set = roof(30);
     let run = |clustering, seam_steps| {
-        let options = Options { clustering, seam_steps, ..Options::with_molds(90) };
+        let options = Options { clustering, seam_steps, ..with_molds(90) };
         panel(&set, &options).unwrap().measures
     };
-    for clustering in [Clustering::Own, Clustering::Grid(DiagramAxis::SignedRoot)] {
+    for clustering in [Clustering::Own, Clustering::Grid] {
         let (alone, joint) = (run(clustering, 0), run(clustering, 8));
         assert!(joint.kinks.median <= 0.85 * alone.kinks.median);
         assert!(joint.gaps.median <= alone.gaps.median);
@@ -179,10 +187,9 @@ fn the_joint_seam_step_lowers_kinks_and_gaps() {
 #[test]
 fn own_clustering_beats_the_grid_with_at_most_as_many_molds_as_asked() {
     let set = roof(20);
-    let run = |clustering| {
-        panel(&set, &Options { clustering, seam_steps: 0, ..Options::with_molds(40) }).unwrap()
-    };
-    let (own, grid) = (run(Clustering::Own), run(Clustering::Grid(DiagramAxis::SignedRoot)));
+    let run =
+        |clustering| panel(&set, &Options { clustering, seam_steps: 0, ..with_molds(40) }).unwrap();
+    let (own, grid) = (run(Clustering::Own), run(Clustering::Grid));
     assert_eq!(own.molds.len(), 40);
     assert!(grid.molds.len() <= 40);
     assert!(own.measures.kinks.median < grid.measures.kinks.median);
@@ -197,7 +204,7 @@ fn results_do_not_depend_on_threads() {
     let set = roof(14);
     let run = |threads: usize| -> Paneling {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
-        pool.install(|| panel(&set, &Options::with_molds(25)).unwrap())
+        pool.install(|| panel(&set, &with_molds(25)).unwrap())
     };
     let one = run(1);
     assert_eq!(one, run(2));
@@ -213,7 +220,7 @@ fn scale_and_place_change_kinks_little_and_gaps_in_proportion() {
     let moved = points.iter().map(|p| 1000.0 * (turn * *p + shift)).collect();
     let moved = surface.with_control_points(moved).unwrap();
     let run = |s: &BsplineSurface| {
-        panel(&panels(s, Pattern::Quad, 8, 8), &Options::with_molds(16)).unwrap().measures
+        panel(&panels(s, Pattern::Quad, 8, 8), &with_molds(16)).unwrap().measures
     };
     let (here, there) = (run(&surface), run(&moved));
     // Ties in the clustering could fall differently, the statistics may not.
@@ -224,35 +231,63 @@ fn scale_and_place_change_kinks_little_and_gaps_in_proportion() {
 #[test]
 fn bad_options_are_named() {
     let set = roof(3);
-    let error = panel(&set, &Options::with_molds(10)).unwrap_err();
-    assert_eq!(error, PanelingError::MoldCount { molds: 10, panels: 9 });
+    let error = panel(&set, &with_molds(10)).unwrap_err();
+    assert_eq!(error, Error::MoldCount { molds: 10, panels: 9 });
     assert_eq!(
         error.to_string(),
         "10 molds for 9 panels; ask for at most one per panel, and at least one"
     );
-    assert!(panel(&set, &Options::with_molds(0)).is_err());
+    assert!(panel(&set, &with_molds(0)).is_err());
     let slope_weight = f64::NAN;
-    let options = Options { slope_weight, ..Options::with_molds(2) };
-    assert!(matches!(panel(&set, &options), Err(PanelingError::BadOption { .. })));
+    let options = Options { slope_weight, ..with_molds(2) };
+    assert!(matches!(panel(&set, &options), Err(Error::BadOption { .. })));
+}
+
+fn within(set: &PanelSet, degrees: f64, types: &[MoldType]) -> Solution {
+    let options = Options {
+        max_kink_deg: Some(degrees),
+        mold_types: List(types.to_vec()),
+        compare_grid: false,
+        ..Options::default()
+    };
+    solve(set, &options, &mut ()).unwrap()
 }
 
 #[test]
 fn bounds_are_kept_or_called_unmet() {
+    use gp_solver::Status;
     let set = roof(10);
-    let options = Options::with_molds(1);
-    let run = |degrees: f64, types: &[MoldType]| {
-        let bounds = Bounds { max_kink: Some(degrees.to_radians()), max_gap: None };
-        panel_within(&set, &bounds, types, &PriceList::counting_molds(), &options).unwrap()
-    };
-    let found = run(1.0, &[MoldType::Cubic]);
-    assert!(found.is_within && found.paneling.measures.kinks.max <= 1.0_f64.to_radians());
-    assert_eq!(found.cost, found.paneling.molds.len() as f64);
-    assert!(found.paneling.molds.len() < 40, "{} molds", found.paneling.molds.len());
-    let several = run(3.0, &[MoldType::Cubic, MoldType::Plane, MoldType::Paraboloid]);
-    assert!(several.is_within);
-    let hopeless = run(1e-6, &[MoldType::Plane]);
-    assert!(!hopeless.is_within && hopeless.worst_excess > 1.0);
-    let bounds = Bounds { max_kink: None, max_gap: Some(-1.0) };
-    let error = panel_within(&set, &bounds, &[], &PriceList::counting_molds(), &options);
-    assert!(matches!(error, Err(PanelingError::BadOption { .. })));
+    let found = within(&set, 1.0, &[MoldType::Cubic]);
+    assert_eq!(found.report.status, Status::Converged);
+    assert!(found.metrics.worst_excess.unwrap() <= 1.0);
+    assert!(found.result.measures.kinks.max <= 1.0_f64.to_radians());
+    assert_eq!(found.metrics.cost, found.result.molds.len() as f64);
+    assert!(found.result.molds.len() < 40, "{} molds", found.result.molds.len());
+    let several = within(&set, 3.0, &[MoldType::Cubic, MoldType::Plane, MoldType::Paraboloid]);
+    assert_eq!(several.report.status, Status::Converged);
+    let hopeless = within(&set, 1e-6, &[MoldType::Plane]);
+    assert_eq!(hopeless.report.status, Status::Infeasible);
+    assert!(hopeless.metrics.worst_excess.unwrap() > 1.0);
+    let options = Options { max_gap: Some(-1.0), ..Options::default() };
+    let error = solve(&set, &options, &mut ()).unwrap_err();
+    assert_eq!(error, Error::BadOption { name: "max_gap", value: -1.0 });
+    let planes = PriceList::new([(MoldType::Plane, Price { mold: 1.0, panel: 1.0 })]);
+    let input = paneling::Input::from(&set).with_prices(planes);
+    let error = solve(input, &Options::default(), &mut ()).unwrap_err();
+    assert_eq!(error, Error::NoPrice { kind: "cubic" });
+}
+
+#[test]
+fn the_grid_is_compared_with_as_many_molds() {
+    let set = roof(10);
+    let own = solve(&set, &Options { molds: Some(20), ..Options::default() }, &mut ()).unwrap();
+    let options = Options { molds: Some(20), clustering: Clustering::Grid, ..Options::default() };
+    let grid = solve(&set, &options, &mut ()).unwrap();
+    assert_eq!(own.metrics.grid, Some(grid.metrics.quality));
+    assert_eq!(grid.metrics.grid, Some(grid.metrics.quality));
+    assert_eq!(own.grid.unwrap().measures, grid.result.measures);
+    let json = serde_json::to_value(own.metrics).unwrap();
+    assert_eq!(json["grid"]["molds"], grid.metrics.quality.molds);
+    assert_eq!(json["molds"], 20);
+    assert!(json.get("worst_excess").is_none());
 }

@@ -5,7 +5,7 @@ use crate::commands::weingarten::outcome;
 use crate::context::Context;
 use crate::failure::Failure;
 use crate::outcome::{Outcome, Status};
-use crate::panel_files::{Quality, encode};
+use crate::panel_files::encode;
 use crate::report_support;
 use crate::report_support::panels::{gap_histogram, kink_histogram, panel_view, seam_table};
 use crate::report_support::weingarten::weingarten_report;
@@ -13,7 +13,7 @@ use crate::watch::Watch;
 use bspline::BsplineSurface;
 use exchange::{LengthUnit, Model};
 use gp_solver::Counts;
-use paneling::{Clustering, Layout, Options, PanelSet, Paneling, Pattern, mold_count, panel};
+use paneling::{Clustering, Error, Options, PanelSet, Paneling, Quality, solve};
 use report::Report;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
@@ -111,18 +111,21 @@ struct Panelings {
 
 impl Panelings {
     fn new(before: &BsplineSurface, after: &BsplineSurface) -> Result<Self, Failure> {
-        let layout = Layout::generate(Pattern::Quad, PANELS.0, PANELS.1, [false, false])
-            .map_err(Failure::other)?;
-        let options = Options::with_molds(mold_count(K, layout.len()));
+        let (u, v) = PANELS;
+        let options = Options {
+            panels: Some(Counts { u, v }),
+            k: Some(K),
+            compare_grid: false,
+            ..Options::default()
+        };
         let by_cost = Options { clustering: Clustering::Cover, ..options.clone() };
-        let cut = |surface| {
-            let set = PanelSet::new(surface, &layout)?;
-            let paneling = panel(&set, &options)?;
-            Ok((set, paneling))
+        let cut = |surface: &BsplineSurface| {
+            let solution = solve(surface, &options, &mut ())?;
+            Ok((solution.panels, solution.result))
         };
         let (before, after) = rayon::join(|| cut(before), || cut(after));
         let (before, after) = (before.map_err(failed)?, after.map_err(failed)?);
-        let cost_driven = panel(&before.0, &by_cost).map_err(failed)?;
+        let cost_driven = solve(&before.0, &by_cost, &mut ()).map_err(failed)?.result;
         Ok(Self { before, cost_driven, after })
     }
 
@@ -182,6 +185,6 @@ impl Panelings {
 }
 
 /// The built-in roof can always be cut; if not, the slip is ours.
-fn failed(error: paneling::PanelingError) -> Failure {
+fn failed(error: Error) -> Failure {
     Failure::other(format!("the built-in roof cannot be cut into panels: {error}"))
 }

@@ -5,15 +5,17 @@ use crate::context::Context;
 use crate::failure::Failure;
 use crate::layered;
 use crate::outcome::{Outcome, Status};
-use crate::panel_files::{PANEL_OUTPUTS, Quality, encode};
+use crate::panel_files::{PANEL_OUTPUTS, encode};
 use crate::report_support;
 use crate::report_support::panels::paneling_report;
 use crate::surface_file::read_surface;
+use crate::watch::Watch;
 use bspline::BsplineSurface;
 use exchange::LengthUnit;
+use gp_solver::List;
 use paneling::{
-    Bounded, Bounds, Clustering, DiagramAxis, Layout, MoldType, Options, PanelSet, Paneling,
-    Pattern, PriceList, mold_count, panel, panel_within,
+    Clustering, Error, Input, Layout, MoldType, Options, Paneling, Pattern, PriceList, Solution,
+    solve,
 };
 use report::Report;
 use serde::{Deserialize, Serialize};
@@ -77,7 +79,7 @@ pub(crate) struct PanelOptions {
     /// Prices of molds and panels by type (RON)
     #[arg(long, value_name = "FILE.ron")]
     prices: Option<PathBuf>,
-    /// Most steps of the joint seam step (default 8); 0 leaves it out
+    /// Most steps of the joint seam step (default 40); 0 leaves it out
     #[arg(long, value_name = "N")]
     seam_steps: Option<usize>,
     /// Width and height of the sheets for flat outlines, in model units (default: one large sheet)
@@ -100,31 +102,29 @@ layered!(PanelOptions {
     sheet,
 });
 
-/// How the number of molds is chosen.
-enum MoldRule {
-    PerRoot(f64),
-    Count(usize),
-    Bounds(Bounds),
-}
-
 impl PanelOptions {
-    fn rule(&self) -> Result<Option<MoldRule>, Failure> {
+    /// Whether there is a rule for the number of molds; refuses several.
+    fn has_rule(&self) -> Result<bool, Failure> {
         let has_bounds = self.max_kink_deg.is_some() || self.max_gap.is_some();
         let rules = [self.k.is_some(), self.molds.is_some(), has_bounds];
-        if rules.iter().filter(|r| **r).count() > 1 {
-            return Err(Failure::usage(
-                "k, molds and the bounds max-kink-deg, max-gap exclude one another; keep one",
-            ));
+        match rules.iter().filter(|r| **r).count() {
+            2.. => Err(Failure::usage(Error::SeveralRules)),
+            count => Ok(count == 1),
         }
-        if let Some(k) = self.k.filter(|k| !(*k > 0.0 && k.is_finite())) {
-            return Err(Failure::usage(format!("k is {k}; it must be positive")));
-        }
-        let bounds =
-            Bounds { max_kink: self.max_kink_deg.map(f64::to_radians), max_gap: self.max_gap };
-        Ok(match (self.k, self.molds) {
-            (Some(k), _) => Some(MoldRule::PerRoot(k)),
-            (_, Some(molds)) => Some(MoldRule::Count(molds)),
-            _ => has_bounds.then_some(MoldRule::Bounds(bounds)),
+    }
+
+    /// The options of the library.
+    fn settings(&self) -> Result<Options, Failure> {
+        let defaults = Options::default();
+        Ok(Options {
+            clustering: self.clustering()?,
+            k: self.k,
+            molds: self.molds,
+            max_kink_deg: self.max_kink_deg,
+            max_gap: self.max_gap,
+            mold_types: self.mold_types.clone().map_or(defaults.mold_types, List),
+            seam_steps: self.seam_steps.unwrap_or(defaults.seam_steps),
+            ..Options::default()
         })
     }
 
@@ -146,14 +146,14 @@ impl PanelOptions {
         if let Some(path) = &self.prices {
             report.option("prices", path.display());
         }
-        let most = self.seam_steps.unwrap_or_else(|| Options::with_molds(1).seam_steps);
+        let most = self.seam_steps.unwrap_or_else(|| Options::default().seam_steps);
         report.option("most seam steps", most);
     }
 
     fn clustering(&self) -> Result<Clustering, Failure> {
         match self.clustering.as_deref() {
             None | Some("own") => Ok(Clustering::Own),
-            Some("grid") => Ok(Clustering::Grid(DiagramAxis::SignedRoot)),
+            Some("grid") => Ok(Clustering::Grid),
             Some("cover") => Ok(Clustering::Cover),
             Some(other) => {
                 Err(Failure::usage(format!("unknown clustering `{other}`; use own, grid or cover")))
@@ -199,38 +199,41 @@ impl Panel {
         self.check_outputs()?;
         self.report.check()?;
         let mut config: PanelOptions = self.config.load()?;
-        if self.options.rule()?.is_some() {
+        if self.options.has_rule()? {
             // A rule on the command line replaces whatever rule the file has.
             config =
                 PanelOptions { k: None, molds: None, max_kink_deg: None, max_gap: None, ..config };
         }
         let options = self.options.over(config);
-        let rule = options.rule()?.unwrap_or(MoldRule::PerRoot(3.0));
+        let settings = options.settings()?;
         let (model, named) = read_surface(&self.surface)?;
         let unit = model.unit;
         let layout = options.layout(&named.surface)?;
-        let set =
-            PanelSet::new(&named.surface, &layout).map_err(|e| Failure::input(&self.surface, e))?;
         let prices = match &options.prices {
             None => PriceList::counting_molds(),
             Some(path) => exchange::read_ron(path).map_err(|e| Failure::input(path, e))?,
         };
-        let result = solve(&set, &options, &rule, &prices)?;
-        let paneling = &result.bounded.paneling;
-        let mut outcome = Outcome::new(result.status, result.iterations)
+        let input = Input::from(&named.surface).with_layout(&layout).with_prices(prices);
+        let solution = solve(input, &settings, &mut Watch::new(context, "panelling")).map_err(
+            |e| match e {
+                Error::Singular { .. } => Failure::input(&self.surface, e),
+                Error::NoPrice { .. } | Error::BadPrice { .. } => match &options.prices {
+                    Some(path) => Failure::input(path, e),
+                    None => Failure::usage(e),
+                },
+                _ => Failure::usage(e),
+            },
+        )?;
+        let (paneling, set) = (&solution.result, &solution.panels);
+        let mut outcome = Outcome::new(solution.report.status, paneling.iterations())
             .with_input(&self.surface)
-            .with_metrics(&PanelMetrics {
-                chosen: Quality::new(&set, paneling),
-                cost: result.bounded.cost,
-                worst_excess: result.worst_excess,
-                grid: result.grid.as_ref().map(|grid| Quality::new(&set, grid)),
-            })?;
+            .with_metrics(&solution.metrics)?;
         outcome.warnings = model.warnings;
         outcome.require_converged = self.converged.require_converged;
-        outcome.summary = summary(&set, &result, &unit);
+        outcome.summary = summary(&solution, &unit);
         for path in self.output {
             let sheet = options.sheet.map(|s| s.0);
-            let files = encode(&path, &set, paneling, &unit, sheet)?;
+            let files = encode(&path, set, paneling, &unit, sheet)?;
             if ["svg", "dxf"].contains(&exchange::extension_of(&path).as_str()) {
                 outcome.warnings.extend(not_unrolled(paneling, &path));
             }
@@ -238,7 +241,7 @@ impl Panel {
         }
         if self.report.wanted() {
             let bounds = [options.max_kink_deg, options.max_gap];
-            let mut report = paneling_report(&set, paneling, bounds, &unit.to_string())?;
+            let mut report = paneling_report(set, paneling, bounds, &unit.to_string())?;
             options.list(&mut report, paneling);
             report_support::add_files(&mut outcome, &self.report, context, report)?;
         }
@@ -277,102 +280,11 @@ fn not_unrolled(paneling: &Paneling, path: &Path) -> Option<String> {
     })
 }
 
-struct Solved {
-    bounded: Bounded,
-    status: Status,
-    iterations: usize,
-    worst_excess: Option<f64>,
-    grid: Option<Paneling>,
-}
-
-fn solve(
-    set: &PanelSet,
-    options: &PanelOptions,
-    rule: &MoldRule,
-    prices: &PriceList,
-) -> Result<Solved, Failure> {
-    let types = options.mold_types.clone().unwrap_or_else(|| vec![MoldType::Cubic]);
-    let mut settings = Options::with_molds(match rule {
-        MoldRule::PerRoot(k) => mold_count(*k, set.len()),
-        MoldRule::Count(molds) => *molds,
-        MoldRule::Bounds(_) => 1,
-    });
-    settings.clustering = options.clustering()?;
-    settings.seam_steps = options.seam_steps.unwrap_or(settings.seam_steps);
-    prices.check(&types).map_err(|e| match &options.prices {
-        Some(path) => Failure::input(path, e),
-        None => Failure::usage(e),
-    })?;
-    let (bounded, worst_excess, grid) = match rule {
-        MoldRule::Bounds(bounds) => {
-            let found =
-                panel_within(set, bounds, &types, prices, &settings).map_err(Failure::usage)?;
-            let worst = found.worst_excess;
-            settings.molds = found.paneling.molds.len();
-            settings.mold_type = types.iter().copied().max().unwrap_or(MoldType::Cubic);
-            let grid = grid_options(&settings).map(|o| panel(set, &o)).transpose();
-            (found, Some(worst), grid.map_err(Failure::usage)?)
-        }
-        _ => {
-            let [kind] = types[..] else {
-                return Err(Failure::usage(
-                    "several mold types need bounds to choose by; add max-kink-deg or max-gap",
-                ));
-            };
-            settings.mold_type = kind;
-            let (paneling, grid) = rayon::join(
-                || panel(set, &settings),
-                || grid_options(&settings).map(|o| panel(set, &o)).transpose(),
-            );
-            let (paneling, grid) =
-                (paneling.map_err(Failure::usage)?, grid.map_err(Failure::usage)?);
-            let cost = paneling.cost(prices);
-            let bounded =
-                Bounded { paneling, is_within: true, worst_excess: 0.0, cost, attempts: 1 };
-            (bounded, None, grid)
-        }
-    };
-    let grid = match settings.clustering {
-        Clustering::Grid(_) => Some(bounded.paneling.clone()),
-        Clustering::Own | Clustering::Cover => grid,
-    };
-    let status = match rule {
-        MoldRule::Bounds(_) if bounded.is_within => Status::Converged,
-        MoldRule::Bounds(_) => Status::Infeasible,
-        _ if bounded.paneling.has_settled() => Status::Converged,
-        _ => Status::IterationLimit,
-    };
-    let iterations =
-        bounded.paneling.fit_history.len() + bounded.paneling.seam_history.len().saturating_sub(1);
-    Ok(Solved { bounded, status, iterations, worst_excess, grid })
-}
-
-/// The published grid to compare with, if it was not chosen anyway.
-fn grid_options(settings: &Options) -> Option<Options> {
-    let clustering = Clustering::Grid(DiagramAxis::SignedRoot);
-    (settings.clustering == Clustering::Own).then(|| Options { clustering, ..settings.clone() })
-}
-
-/// The `metrics` object.
-#[derive(Serialize)]
-struct PanelMetrics {
-    #[serde(flatten)]
-    chosen: Quality,
-    cost: f64,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    worst_excess: Option<f64>,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    grid: Option<Quality>,
-}
-
-fn summary(set: &PanelSet, result: &Solved, unit: &LengthUnit) -> Vec<String> {
-    let paneling = &result.bounded.paneling;
-    let quality = Quality::new(set, paneling);
+fn summary(solution: &Solution, unit: &LengthUnit) -> Vec<String> {
+    let (paneling, metrics) = (&solution.result, &solution.metrics);
+    let quality = &metrics.quality;
     let mut lines = vec![
-        format!(
-            "{} panels on {} molds, cost {:.2}",
-            quality.panels, quality.molds, result.bounded.cost
-        ),
+        format!("{} panels on {} molds, cost {:.2}", quality.panels, quality.molds, metrics.cost),
         format!(
             "  kinks: median {:.4}°, 95 % below {:.4}°, largest {:.4}°",
             quality.kink_median_deg, quality.kink_p95_deg, quality.kink_max_deg
@@ -390,8 +302,8 @@ fn summary(set: &PanelSet, result: &Solved, unit: &LengthUnit) -> Vec<String> {
         .map(|(kind, n)| format!("{n} {}", kind.name()))
         .collect();
     lines.push(format!("  molds by type: {}", used.join(", ")));
-    if result.status == Status::Infeasible {
-        let excess = result.bounded.worst_excess;
+    if solution.report.status == Status::Infeasible {
+        let excess = metrics.worst_excess.unwrap_or(f64::INFINITY);
         lines.push(format!(
             "  the bounds are not met: the worst seam is {excess:.2} times beyond them"
         ));

@@ -56,7 +56,7 @@ fn bad_input_is_one_sentence() {
     refused(&["--prices", &negative], &format!("{negative}: the price of cubic is -1"));
     refused(&["--mold-types", "plane,cubic"], "several mold types need bounds to choose by");
     refused(&["--mold-types", "conic"], "unknown mold type `conic`");
-    refused(&["--max-kink-deg=-1"], "the largest kink is ");
+    refused(&["--max-kink-deg=-1"], "`max_kink_deg` is -1; it must be positive");
     refused(&["--k", "2", "--molds", "5"], "exclude one another; keep one");
     refused(&["--clustering", "best"], "unknown clustering `best`; use own, grid or cover");
     refused(&["--layout", "circles"], "unknown layout `circles`");

@@ -1,7 +1,9 @@
-//! Factorisations of symmetric positive definite matrices, chosen by structure.
+//! Symmetric positive definite systems: factorisations chosen by structure, and conjugate gradients
+//! for matrices that are not formed.
 
 mod band;
 mod band_kernel;
+mod cg;
 #[cfg(feature = "sparse")]
 mod dense;
 #[cfg(feature = "sparse")]
@@ -15,6 +17,7 @@ mod pattern;
 mod sparse;
 
 pub use band::BandCholesky;
+pub use cg::{CgOptions, CgReport, ConjugateGradients, LinearOperator, Preconditioner};
 pub(crate) use factor::{Factor, Storage};
 #[cfg(feature = "sparse")]
 pub use multifrontal::MultifrontalCholesky;

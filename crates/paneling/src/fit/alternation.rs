@@ -8,8 +8,8 @@ use crate::fit::state::{EXACT, Fit};
 use crate::fit::torus_start;
 use crate::layout::panels::{PanelSet, Pose};
 use crate::mold::shape::{MAX_PARAMETERS, Mold, MoldType};
+use crate::pulse::Pulse;
 use numerics::{PIVOT_RATIO, add_normal_row, factor_semidefinite, solve_semidefinite};
-use rayon::prelude::*;
 
 /// A round that lowers the energy by less than this share ends the alternation.
 pub(crate) const STALL: f64 = 1e-2;
@@ -22,48 +22,78 @@ const REGISTRATION_STEPS: usize = 2;
 /// Damping of a registration, a share of the mean diagonal.
 const REGISTRATION_DAMPING: f64 = 1e-4;
 
-impl Fit {
-    /// Fits molds and poses in at most `rounds` rounds; the energy never rises. The first
-    /// alternates between molds and poses and try both half turns of every panel, the others move
-    /// every mold together with its panels. Returns the energy after each round.
-    pub(crate) fn alternate(&mut self, set: &PanelSet, rounds: usize) -> Vec<f64> {
-        let mut history = Vec::new();
-        let mut joint = vec![Some(FIRST_DAMPING); self.molds.len()];
-        for round in 0..rounds {
-            self.center_tori(set);
-            if round < ALTERNATING {
-                self.refit_molds(set);
-                self.register(set);
-            } else {
-                self.step_jointly(set, &mut joint);
-            }
-            let energy = self.energy();
-            let stalled =
-                history.last().is_some_and(|&before: &f64| energy > (1.0 - STALL) * before);
-            history.push(energy);
-            tracing::debug!(round, energy, "molds and poses");
-            let is_exact = energy <= EXACT * set.samples.points.len() as f64;
-            if is_exact || (stalled && round > ALTERNATING) {
-                break;
-            }
+/// An alternation between two rounds.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct Alternation {
+    /// Damping of every mold's next step; `None` where the last one changed too little.
+    pub(crate) damping: Vec<Option<f64>>,
+    /// Rounds done.
+    pub(crate) rounds: usize,
+    /// Energy after the last round.
+    pub(crate) energy: Option<f64>,
+}
+
+impl Alternation {
+    pub(crate) fn new(molds: usize) -> Self {
+        Self { damping: vec![Some(FIRST_DAMPING); molds], rounds: 0, energy: None }
+    }
+
+    /// One round. The first alternates between molds and poses and tries both half turns of every
+    /// panel, the others move every mold together with its panels; the energy never rises. Returns
+    /// whether another round is worth while, `None` if asked to stop.
+    pub(crate) fn round(
+        &mut self,
+        set: &PanelSet,
+        fit: &mut Fit,
+        pulse: &Pulse<'_>,
+    ) -> Option<bool> {
+        fit.center_tori(set, pulse)?;
+        if self.rounds < ALTERNATING {
+            fit.refit_molds(set, pulse)?;
+            fit.register(set, pulse)?;
+        } else {
+            fit.step_jointly(set, &mut self.damping, pulse)?;
         }
-        history
+        let energy = fit.energy();
+        let stalled = self.energy.is_some_and(|before| energy > (1.0 - STALL) * before);
+        let is_exact = energy <= EXACT * set.samples.points.len() as f64;
+        let is_last = is_exact || (stalled && self.rounds > ALTERNATING);
+        tracing::debug!(round = self.rounds, energy, "molds and poses");
+        self.energy = Some(energy);
+        self.rounds += 1;
+        Some(!is_last)
+    }
+}
+
+impl Fit {
+    /// Fits molds and poses in at most `rounds` rounds; `None` if asked to stop.
+    pub(crate) fn alternate(
+        &mut self,
+        set: &PanelSet,
+        rounds: usize,
+        pulse: &Pulse<'_>,
+    ) -> Option<()> {
+        let mut alternation = Alternation::new(self.molds.len());
+        while alternation.rounds < rounds && alternation.round(set, self, pulse)? {}
+        Some(())
     }
 
     /// A step of every mold that still moves, together with its panels. `damping` is `None` where
     /// the last step changed too little.
-    fn step_jointly(&mut self, set: &PanelSet, damping: &mut [Option<f64>]) {
-        let moved: Vec<_> = damping
-            .par_iter_mut()
-            .enumerate()
-            .map(|(m, damping)| {
-                let step = damping.as_mut().and_then(|d| mold_step::step(set, self, m, d));
-                if step.is_none() {
-                    *damping = None;
-                }
-                step
-            })
-            .collect();
+    fn step_jointly(
+        &mut self,
+        set: &PanelSet,
+        damping: &mut [Option<f64>],
+        pulse: &Pulse<'_>,
+    ) -> Option<()> {
+        let items = damping.iter_mut().collect();
+        let moved = pulse.map_molds(&self.members, items, |m, damping: &mut Option<f64>| {
+            let step = damping.as_mut().and_then(|d| mold_step::step(set, self, m, d));
+            if step.is_none() {
+                *damping = None;
+            }
+            step
+        })?;
         for (m, moved) in moved.into_iter().enumerate() {
             let Some(moved) = moved else { continue };
             self.molds[m] = moved.mold;
@@ -78,45 +108,45 @@ impl Fit {
                 damping[m] = None;
             }
         }
+        Some(())
     }
 
     /// Moves the origins of tori into the middle of their panels where that lowers the energy: the
     /// surface stays, heights and slopes are measured in a better direction.
-    fn center_tori(&mut self, set: &PanelSet) {
-        let tori = (0..self.molds.len())
-            .into_par_iter()
-            .filter(|&m| self.molds[m].kind == MoldType::Torus);
-        let centered: Vec<_> = tori
-            .filter_map(|m| {
-                let members = &self.members[m];
-                let (mold, poses) =
-                    torus_start::centered(set, members, &self.poses, &self.molds[m])?;
-                let energy = |(&p, pose): (&usize, &Pose)| {
-                    let (points, normals) = set.panel_samples(p);
-                    panel_energy(&mold, self.slope_weight, pose, points, normals)
-                };
-                let energies: Vec<f64> = members.iter().zip(&poses).map(energy).collect();
-                let before: f64 = members.iter().map(|&p| self.energies[p]).sum();
-                // A panel beyond the reach of the torus has no energy; any number is better.
-                let is_better = energies.iter().sum::<f64>() <= before || before.is_nan();
-                is_better.then_some((m, mold, poses, energies))
-            })
-            .collect();
-        for (m, mold, poses, energies) in centered {
+    fn center_tori(&mut self, set: &PanelSet, pulse: &Pulse<'_>) -> Option<()> {
+        let items = vec![(); self.molds.len()];
+        let centered = pulse.map_molds(&self.members, items, |m, ()| {
+            if self.molds[m].kind != MoldType::Torus {
+                return None;
+            }
+            let members = &self.members[m];
+            let (mold, poses) = torus_start::centered(set, members, &self.poses, &self.molds[m])?;
+            let energy = |(&p, pose): (&usize, &Pose)| {
+                let (points, normals) = set.panel_samples(p);
+                panel_energy(&mold, self.slope_weight, pose, points, normals)
+            };
+            let energies: Vec<f64> = members.iter().zip(&poses).map(energy).collect();
+            let before: f64 = members.iter().map(|&p| self.energies[p]).sum();
+            // A panel beyond the reach of the torus has no energy; any number is better.
+            let is_better = energies.iter().sum::<f64>() <= before || before.is_nan();
+            is_better.then_some((mold, poses, energies))
+        })?;
+        for (m, centered) in centered.into_iter().enumerate() {
+            let Some((mold, poses, energies)) = centered else { continue };
             self.molds[m] = mold;
             for ((&p, pose), energy) in self.members[m].iter().zip(poses).zip(energies) {
                 self.poses[p] = pose;
                 self.energies[p] = energy;
             }
         }
+        Some(())
     }
 
     /// One Gauss-Newton step of every mold's parameters (exact where these are linear).
-    fn refit_molds(&mut self, set: &PanelSet) {
-        let refitted: Vec<Mold> =
-            (0..self.molds.len()).into_par_iter().map(|m| self.refitted(set, m)).collect();
-        self.molds = refitted;
-        self.update_energies(set);
+    fn refit_molds(&mut self, set: &PanelSet, pulse: &Pulse<'_>) -> Option<()> {
+        let items = vec![(); self.molds.len()];
+        self.molds = pulse.map_molds(&self.members, items, |m, ()| self.refitted(set, m))?;
+        self.update_energies(set, pulse)
     }
 
     fn refitted(&self, set: &PanelSet, m: usize) -> Mold {
@@ -158,25 +188,22 @@ impl Fit {
     }
 
     /// Rigid registration of every panel on its mold, of the two half turns the better.
-    fn register(&mut self, set: &PanelSet) {
-        let registered: Vec<(Pose, f64)> = (0..set.len())
-            .into_par_iter()
-            .with_min_len(16)
-            .map(|p| {
-                let mold = &self.molds[self.labels[p]];
-                let here = (self.poses[p], self.energies[p]);
-                let best = self.registered(set, p, mold, here);
-                let turned = self.poses[p].turned();
-                let (points, normals) = set.panel_samples(p);
-                let energy = panel_energy(mold, self.slope_weight, &turned, points, normals);
-                let other = self.registered(set, p, mold, (turned, energy));
-                if other.1 < best.1 { other } else { best }
-            })
-            .collect();
+    fn register(&mut self, set: &PanelSet, pulse: &Pulse<'_>) -> Option<()> {
+        let registered = pulse.map(set.len(), 16, |p| {
+            let mold = &self.molds[self.labels[p]];
+            let here = (self.poses[p], self.energies[p]);
+            let best = self.registered(set, p, mold, here);
+            let turned = self.poses[p].turned();
+            let (points, normals) = set.panel_samples(p);
+            let energy = panel_energy(mold, self.slope_weight, &turned, points, normals);
+            let other = self.registered(set, p, mold, (turned, energy));
+            if other.1 < best.1 { other } else { best }
+        })?;
         for (p, (pose, energy)) in registered.into_iter().enumerate() {
             self.poses[p] = pose;
             self.energies[p] = energy;
         }
+        Some(())
     }
 
     /// A few damped Gauss-Newton steps of a panel's pose, taken only if they lower its energy.

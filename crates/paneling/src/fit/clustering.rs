@@ -3,13 +3,17 @@
 use crate::fit::residuals::{sample_mold_rows, sample_residual};
 use crate::layout::panels::PanelSet;
 use crate::mold::shape::{MAX_PARAMETERS, Mold, MoldType};
+use crate::pulse::Pulse;
+use gp_solver::choices;
 use numerics::{PIVOT_RATIO, add_normal_row, factor_semidefinite, solve_semidefinite};
 use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
 use std::cmp::Reverse;
 use std::collections::{BinaryHeap, HashMap};
 
 /// Second coordinate of the curvature diagram in which the grid clusters; the first is `H`.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
 pub enum DiagramAxis {
     /// `sign(K) √|K|`.
     #[default]
@@ -17,6 +21,8 @@ pub enum DiagramAxis {
     /// `√(H² − K)`, half the difference of the principal curvatures.
     HalfDifference,
 }
+
+choices!(DiagramAxis { SignedRoot = "signed_root", HalfDifference = "half_difference" });
 
 /// Panels grouped by mold.
 #[derive(Clone, Debug, PartialEq)]
@@ -33,7 +39,12 @@ pub(crate) struct Clusters {
 /// at most `count` are occupied (Pellis et al. 2021, Sec. 4.2).
 ///
 /// The paper names `(H, √K)`, which does not exist for `K < 0`; `axis` says what stands for it.
-pub(crate) fn grid(curvatures: &[[f64; 2]], count: usize, axis: DiagramAxis) -> Clusters {
+pub(crate) fn grid(
+    curvatures: &[[f64; 2]],
+    count: usize,
+    axis: DiagramAxis,
+    pulse: &Pulse<'_>,
+) -> Option<Clusters> {
     let second = |[h, k]: [f64; 2]| match axis {
         DiagramAxis::SignedRoot => k.signum() * k.abs().sqrt(),
         DiagramAxis::HalfDifference => (h * h - k).max(0.0).sqrt(),
@@ -48,6 +59,9 @@ pub(crate) fn grid(curvatures: &[[f64; 2]], count: usize, axis: DiagramAxis) -> 
     // The number of occupied cells is not monotone in the fineness, so the search goes on a while
     // beyond the first grid that has too many.
     for fineness in 1..4 * n.max(1) {
+        if pulse.is_stopped() {
+            return None;
+        }
         let cell = |p: &[f64; 2]| {
             [0, 1].map(|k| {
                 let width = high[k] - low[k];
@@ -70,7 +84,7 @@ pub(crate) fn grid(curvatures: &[[f64; 2]], count: usize, axis: DiagramAxis) -> 
             break;
         }
     }
-    best
+    Some(best)
 }
 
 /// A panel's shape as a point such that distances between points are distances between the best
@@ -104,10 +118,13 @@ pub(crate) fn best_cubic(set: &PanelSet, p: usize, slope_weight: f64) -> (Featur
     (b, gram)
 }
 
-/// The shapes of all panels (lengths in units of the panel size).
-pub(crate) fn features(set: &PanelSet, slope_weight: f64) -> Vec<Feature> {
-    let fitted: Vec<(Feature, [Feature; 7])> =
-        (0..set.len()).into_par_iter().map(|p| best_cubic(set, p, slope_weight)).collect();
+/// The shapes of all panels (lengths in units of the panel size); `None` if asked to stop.
+pub(crate) fn features(
+    set: &PanelSet,
+    slope_weight: f64,
+    pulse: &Pulse<'_>,
+) -> Option<Vec<Feature>> {
+    let fitted = pulse.map(set.len(), 1, |p| best_cubic(set, p, slope_weight))?;
     // The metric: the mean Gram matrix, without the odd cross terms that a centred panel lacks.
     let mut metric = [[0.0; 7]; 7];
     for (_, gram) in &fitted {
@@ -130,7 +147,7 @@ pub(crate) fn features(set: &PanelSet, slope_weight: f64) -> Vec<Feature> {
         }
         out
     };
-    fitted.iter().map(|(c, _)| whiten(c)).collect()
+    Some(fitted.iter().map(|(c, _)| whiten(c)).collect())
 }
 
 /// Squared distance of two shapes over the better of the two half turns, and whether it turns.
@@ -148,12 +165,20 @@ pub(crate) fn distance(a: &Feature, b: &Feature) -> (f64, bool) {
 }
 
 /// k-means in shape space with exactly `count` clusters, none empty. Deterministic: the seeding
-/// draws from a fixed sequence.
-pub(crate) fn shapes(features: &[Feature], count: usize, iterations: usize) -> Clusters {
+/// draws from a fixed sequence. `None` if asked to stop.
+pub(crate) fn shapes(
+    features: &[Feature],
+    count: usize,
+    iterations: usize,
+    pulse: &Pulse<'_>,
+) -> Option<Clusters> {
     let n = features.len();
-    let mut centers = seeds(features, count);
+    let mut centers = seeds(features, count, pulse)?;
     let mut nearest: Vec<(usize, f64, bool)> = Vec::new();
     for _ in 0..iterations {
+        if pulse.is_stopped() {
+            return None;
+        }
         nearest = assign(features, &centers);
         fill_empty(&mut nearest, count);
         let moved = centers_of(features, &nearest, count);
@@ -163,11 +188,11 @@ pub(crate) fn shapes(features: &[Feature], count: usize, iterations: usize) -> C
         centers = moved;
     }
     debug_assert_eq!(nearest.len(), n);
-    Clusters {
+    Some(Clusters {
         labels: nearest.iter().map(|x| x.0).collect(),
         turned: nearest.iter().map(|x| x.2).collect(),
         count,
-    }
+    })
 }
 
 /// Most shapes that are considered as molds by [`cover`], as a multiple of the molds wanted and at
@@ -179,8 +204,8 @@ const HALVINGS: usize = 24;
 
 /// Greedy covering: the shapes of some panels become molds such that every panel is within a
 /// tolerance of one, and the tolerance is the smallest for which `count` suffice. Molds that are
-/// left go to the panels that are worst off.
-pub(crate) fn cover(features: &[Feature], count: usize) -> Clusters {
+/// left go to the panels that are worst off. `None` if asked to stop.
+pub(crate) fn cover(features: &[Feature], count: usize, pulse: &Pulse<'_>) -> Option<Clusters> {
     let wanted = LEAST_CANDIDATES.max(CANDIDATES_PER_MOLD * count);
     let step = features.len().div_ceil(wanted).max(1);
     let candidates: Vec<Feature> = features.iter().copied().step_by(step).collect();
@@ -188,9 +213,9 @@ pub(crate) fn cover(features: &[Feature], count: usize) -> Clusters {
     // differ by rounding.
     let square = |x: &Feature| x.iter().map(|v| v * v).sum::<f64>();
     let rounding = 1e-13 * features.iter().map(square).fold(f64::MIN_POSITIVE, f64::max);
-    let mut high = spread(features, vec![features[0]], count, rounding).1.max(rounding);
+    let mut high = spread(features, vec![features[0]], count, rounding, pulse)?.1.max(rounding);
     let (reached, mut chosen) = loop {
-        let reached = reached_by(features, &candidates, high);
+        let reached = reached_by(features, &candidates, high, pulse)?;
         if let Some(chosen) = greedy_cover(&reached, features.len(), count, high) {
             break (reached, chosen);
         }
@@ -198,6 +223,9 @@ pub(crate) fn cover(features: &[Feature], count: usize) -> Clusters {
     };
     let mut low = 0.0;
     for _ in 0..HALVINGS {
+        if pulse.is_stopped() {
+            return None;
+        }
         let middle = 0.5 * (low + high);
         match greedy_cover(&reached, features.len(), count, middle) {
             Some(found) => (chosen, high) = (found, middle),
@@ -205,27 +233,32 @@ pub(crate) fn cover(features: &[Feature], count: usize) -> Clusters {
         }
     }
     let centers = chosen.iter().map(|&c| candidates[c]).collect();
-    let (centers, _) = spread(features, centers, count, rounding);
+    let (centers, _) = spread(features, centers, count, rounding, pulse)?;
     let mut nearest = assign(features, &centers);
     fill_empty(&mut nearest, centers.len());
-    Clusters {
+    Some(Clusters {
         labels: nearest.iter().map(|x| x.0).collect(),
         turned: nearest.iter().map(|x| x.2).collect(),
         count: centers.len(),
-    }
+    })
 }
 
 /// Shapes a candidate may stand for, nearest first: distance and number.
 type Reached = Vec<(f64, u32)>;
 
-fn reached_by(features: &[Feature], candidates: &[Feature], limit: f64) -> Vec<Reached> {
+fn reached_by(
+    features: &[Feature],
+    candidates: &[Feature],
+    limit: f64,
+    pulse: &Pulse<'_>,
+) -> Option<Vec<Reached>> {
     let near = |center: &Feature| {
         let all = features.iter().zip(0..).map(|(x, p)| (distance(x, center).0, p));
         let mut near: Reached = all.filter(|(d, _)| *d <= limit).collect();
         near.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
         near
     };
-    candidates.par_iter().map(near).collect()
+    pulse.map(candidates.len(), 1, |c| near(&candidates[c]))
 }
 
 /// Adds centers, each the shape furthest from those before, until there are `count` or no shape is
@@ -235,13 +268,17 @@ fn spread(
     mut centers: Vec<Feature>,
     count: usize,
     enough: f64,
-) -> (Vec<Feature>, f64) {
+    pulse: &Pulse<'_>,
+) -> Option<(Vec<Feature>, f64)> {
     let mut distances: Vec<f64> = assign(features, &centers).iter().map(|x| x.1).collect();
     loop {
         let further = |a: usize, b: usize| if distances[b] > distances[a] { b } else { a };
         let furthest = (0..distances.len()).fold(0, further);
         if centers.len() >= count || distances[furthest] <= enough {
-            return (centers, distances[furthest]);
+            return Some((centers, distances[furthest]));
+        }
+        if pulse.is_stopped() {
+            return None;
         }
         let center = features[furthest];
         distances
@@ -352,7 +389,7 @@ fn fill_empty(nearest: &mut [(usize, f64, bool)], count: usize) {
 }
 
 /// Seeds spread by squared distance (k-means++) from a fixed random sequence.
-fn seeds(features: &[Feature], count: usize) -> Vec<Feature> {
+fn seeds(features: &[Feature], count: usize, pulse: &Pulse<'_>) -> Option<Vec<Feature>> {
     const CHUNK: usize = 2048;
     let mut state = 0x9e37_79b9_7f4a_7c15_u64;
     let mut random = move || {
@@ -366,6 +403,9 @@ fn seeds(features: &[Feature], count: usize) -> Vec<Feature> {
     let mut distances = vec![f64::INFINITY; features.len()];
     let mut centers = vec![features[features.len() / 2]];
     while centers.len() < count {
+        if pulse.is_stopped() {
+            return None;
+        }
         let newest = centers[centers.len() - 1];
         let sums: Vec<f64> = distances
             .par_chunks_mut(CHUNK)
@@ -396,12 +436,24 @@ fn seeds(features: &[Feature], count: usize) -> Vec<Feature> {
         }
         centers.push(features[chosen]);
     }
-    centers
+    Some(centers)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    fn grid(curvatures: &[[f64; 2]], count: usize, axis: DiagramAxis) -> Clusters {
+        super::grid(curvatures, count, axis, &Pulse::new(&mut ())).unwrap()
+    }
+
+    fn cover(features: &[Feature], count: usize) -> Clusters {
+        super::cover(features, count, &Pulse::new(&mut ())).unwrap()
+    }
+
+    fn shapes(features: &[Feature], count: usize, iterations: usize) -> Clusters {
+        super::shapes(features, count, iterations, &Pulse::new(&mut ())).unwrap()
+    }
 
     #[test]
     fn grid_has_at_most_the_wanted_cells_and_is_as_fine_as_it_can_be() {
@@ -431,7 +483,8 @@ mod tests {
             .map(|k| std::array::from_fn(|i| ((k * (i + 3)) as f64 * 0.37).sin()))
             .collect();
         let candidates: Vec<Feature> = features.iter().copied().step_by(3).collect();
-        let reached = reached_by(&features, &candidates, f64::INFINITY);
+        let reached =
+            reached_by(&features, &candidates, f64::INFINITY, &Pulse::new(&mut ())).unwrap();
         for tolerance in [0.5, 1.5, 3.0, 6.0] {
             let mut open = vec![true; features.len()];
             let mut greedy = Vec::new();

@@ -10,11 +10,15 @@ use crate::fit::retraction::moved_on;
 use crate::fit::state::Fit;
 use crate::layout::panels::{PanelSet, Pose};
 use crate::mold::shape::{MAX_PARAMETERS, Mold};
+use gp_solver::{Attempt, DampedModel, DampingPolicy, SolverError, Status, Verdict, damped_step};
 use numerics::{PIVOT_RATIO, factor_semidefinite, solve_semidefinite};
 use rayon::prelude::*;
 
-/// Tries per step; damping grows tenfold from one to the next.
+/// Tries per step.
 const TRIES: usize = 4;
+/// How the damping grows from one try to the next, and shrinks after a step.
+const REFUSED: f64 = 10.0;
+const TAKEN: f64 = 0.1;
 /// Damping to start with, a share of the diagonal.
 pub(crate) const FIRST_DAMPING: f64 = 1e-3;
 const LEAST_DAMPING: f64 = 1e-9;
@@ -31,20 +35,40 @@ pub(crate) struct Moved {
 /// A step of mold `m` that lowers the energy of its panels, or `None` if none was found.
 pub(crate) fn step(set: &PanelSet, fit: &Fit, m: usize, damping: &mut f64) -> Option<Moved> {
     let members = &fit.members[m];
-    let mold = &fit.molds[m];
-    let before: f64 = members.iter().map(|&p| fit.energies[p]).sum();
     let blocks: Vec<(Matrix, Row)> = members
         .par_iter()
         .with_min_len(32)
         .map_init(Vec::new, |rows, &p| {
-            design_block(set, p, mold, &fit.poses[p], fit.slope_weight, rows)
+            design_block(set, p, &fit.molds[m], &fit.poses[p], fit.slope_weight, rows)
         })
         .collect();
-    for _ in 0..TRIES {
-        let (change, changes) = solve(&blocks, *damping);
+    let before = members.iter().map(|&p| fit.energies[p]).sum();
+    let mut model = MoldModel { set, fit, m, blocks, before, moved: None };
+    let mut policy = Tenfold { tries: 0 };
+    // The dampings of this mold alone, in a loop of its own beside those of the other molds.
+    let damping = std::slice::from_mut(damping);
+    let accepted = damped_step(&mut model, &mut policy, damping, &mut ()).ok()?.is_ok();
+    model.moved.filter(|_| accepted)
+}
+
+/// A mold and its panels, linearised.
+struct MoldModel<'m> {
+    set: &'m PanelSet,
+    fit: &'m Fit,
+    m: usize,
+    blocks: Vec<(Matrix, Row)>,
+    before: f64,
+    moved: Option<Moved>,
+}
+
+impl DampedModel for MoldModel<'_> {
+    fn attempt(&mut self, damping: &[f64]) -> Result<Attempt, SolverError> {
+        let Self { set, fit, .. } = *self;
+        let mold = &fit.molds[self.m];
+        let (change, changes) = solve(&self.blocks, damping[0]);
         let mut trial = *mold;
         trial.parameters.iter_mut().zip(change).for_each(|(p, s)| *p += s);
-        let panels: Vec<(Pose, f64)> = members
+        let panels: Vec<(Pose, f64)> = fit.members[self.m]
             .par_iter()
             .with_min_len(32)
             .zip(&changes)
@@ -54,14 +78,34 @@ pub(crate) fn step(set: &PanelSet, fit: &Fit, m: usize, damping: &mut f64) -> Op
                 (pose, panel_energy(&trial, fit.slope_weight, &pose, points, normals))
             })
             .collect();
-        // NaN, a panel beyond the reach of a round mold, is refused too.
-        if panels.iter().map(|p| p.1).sum::<f64>() < before {
-            *damping = (0.1 * *damping).max(LEAST_DAMPING);
-            return Some(Moved { mold: trial, panels });
-        }
-        *damping *= 10.0;
+        let decrease = self.before - panels.iter().map(|p| p.1).sum::<f64>();
+        self.moved = Some(Moved { mold: trial, panels });
+        // The policy asks only whether the energy falls.
+        Ok(Attempt { decrease, ..Attempt::default() })
     }
-    None
+}
+
+/// Any decrease will do; damping grows and shrinks tenfold.
+struct Tenfold {
+    tries: usize,
+}
+
+impl DampingPolicy<MoldModel<'_>> for Tenfold {
+    fn judge(&mut self, _: &mut MoldModel<'_>, attempt: &Attempt, damping: &mut [f64]) -> Verdict {
+        // NaN, a panel beyond the reach of a round mold, is refused too.
+        if attempt.decrease > 0.0 {
+            damping[0] = (TAKEN * damping[0]).max(LEAST_DAMPING);
+            return Verdict::Accept;
+        }
+        damping[0] *= REFUSED;
+        self.tries += 1;
+        if self.tries < TRIES { Verdict::Retry } else { Verdict::End(Status::Stalled) }
+    }
+
+    fn mend(&mut self, _: &mut MoldModel<'_>, _: &mut [f64]) -> Verdict {
+        // The small Cholesky leaves out what has no pivot and never fails.
+        Verdict::End(Status::Stalled)
+    }
 }
 
 /// The damped step of the mold and of every pose.

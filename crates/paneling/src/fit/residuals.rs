@@ -145,6 +145,21 @@ pub(crate) fn foot(mold: &Mold, local: DVec3, normal: DVec3) -> (f64, DVec3) {
     (t, DVec3::new(-z.fx, -z.fy, 1.0).normalize())
 }
 
+/// Offset and tilt of the side of a seam at a design point with the given normal and two tangents,
+/// to the bit as [`seam_side`] has them.
+pub(crate) fn seam_values(
+    mold: &Mold,
+    pose: &Pose,
+    point: DVec3,
+    normal: DVec3,
+    tangents: [DVec3; 2],
+) -> [f64; 3] {
+    let to_local = pose.rotation.transpose();
+    let (offset, m) = foot(mold, to_local * (point - pose.origin), to_local * normal);
+    let [a, b] = tangents.map(|t| (to_local * t).dot(m));
+    [offset, a, b]
+}
+
 /// The side of a seam at a design point with the given normal and two tangents.
 pub(crate) fn seam_side(
     mold: &Mold,

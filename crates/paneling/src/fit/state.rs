@@ -5,7 +5,7 @@ use crate::fit::residuals::panel_energy;
 use crate::fit::torus_start::{self, quarter_turn};
 use crate::layout::panels::{PanelSet, Pose};
 use crate::mold::shape::{Mold, MoldType};
-use rayon::prelude::*;
+use crate::pulse::Pulse;
 
 /// Molds with the panels that are made on them; lengths in units of the panel size.
 #[derive(Clone, Debug)]
@@ -27,28 +27,31 @@ pub(crate) struct Fit {
 pub(crate) const EXACT: f64 = 1e-22;
 
 impl Fit {
-    /// Flat molds of the given types, the panels in their principal frames.
+    /// First molds of the given types, the panels in their principal frames; `None` if asked to
+    /// stop.
     pub(crate) fn new(
         set: &PanelSet,
         clusters: &Clusters,
         kinds: &[MoldType],
         slope_weight: f64,
-    ) -> Self {
-        let mut members = vec![Vec::new(); clusters.count];
-        for (p, &c) in clusters.labels.iter().enumerate() {
-            members[c].push(p);
-        }
+        pulse: &Pulse<'_>,
+    ) -> Option<Self> {
+        let members = members_of(&clusters.labels, clusters.count);
         let mut poses: Vec<Pose> = set
             .frames
             .iter()
             .zip(&clusters.turned)
             .map(|(f, &turned)| if turned { f.turned() } else { *f })
             .collect();
-        let molds = members
-            .iter()
-            .zip(kinds)
-            .map(|(panels, &kind)| first_mold(set, panels, kind, slope_weight, &mut poses))
-            .collect();
+        let first = pulse.map_molds(&members, kinds.to_vec(), |m, kind| {
+            let own = members[m].iter().map(|&p| poses[p]).collect();
+            first_mold(set, &members[m], kind, slope_weight, own)
+        })?;
+        let mut molds = Vec::with_capacity(clusters.count);
+        for ((mold, own), panels) in first.into_iter().zip(&members) {
+            molds.push(mold);
+            panels.iter().zip(own).for_each(|(&p, pose)| poses[p] = pose);
+        }
         let mut fit = Self {
             molds,
             labels: clusters.labels.clone(),
@@ -57,17 +60,30 @@ impl Fit {
             energies: vec![0.0; set.len()],
             slope_weight,
         };
-        fit.update_energies(set);
-        fit
+        fit.update_energies(set, pulse)?;
+        Some(fit)
+    }
+
+    /// Every panel in its principal frame on one flat mold: what there is before any fit.
+    pub(crate) fn flat(set: &PanelSet, kind: MoldType, slope_weight: f64) -> Self {
+        Self {
+            molds: vec![Mold::flat(kind)],
+            labels: vec![0; set.len()],
+            poses: set.frames.clone(),
+            members: vec![(0..set.len()).collect()],
+            energies: vec![0.0; set.len()],
+            slope_weight,
+        }
     }
 
     pub(crate) fn energy(&self) -> f64 {
         self.energies.iter().sum()
     }
 
-    pub(crate) fn update_energies(&mut self, set: &PanelSet) {
-        let energies = (0..set.len()).into_par_iter().map(|p| self.panel_energy(set, p)).collect();
-        self.energies = energies;
+    /// `None` if asked to stop.
+    pub(crate) fn update_energies(&mut self, set: &PanelSet, pulse: &Pulse<'_>) -> Option<()> {
+        self.energies = pulse.map(set.len(), 1, |p| self.panel_energy(set, p))?;
+        Some(())
     }
 
     pub(crate) fn panel_energy(&self, set: &PanelSet, p: usize) -> f64 {
@@ -83,11 +99,11 @@ impl Fit {
 
     /// Gives a mold another type and starts its panels afresh from their principal frames.
     pub(crate) fn restart(&mut self, set: &PanelSet, m: usize, kind: MoldType) {
-        for &p in &self.members[m] {
-            self.poses[p] = set.frames[p];
-        }
         let panels = &self.members[m];
-        self.molds[m] = first_mold(set, panels, kind, self.slope_weight, &mut self.poses);
+        let frames = panels.iter().map(|&p| set.frames[p]).collect();
+        let (mold, own) = first_mold(set, panels, kind, self.slope_weight, frames);
+        self.molds[m] = mold;
+        panels.iter().zip(own).for_each(|(&p, pose)| self.poses[p] = pose);
     }
 
     /// Splits a mold in two equal ones; `halves` says for each of its panels whether it stays (0)
@@ -107,16 +123,25 @@ impl Fit {
     }
 }
 
-/// The mold a cluster starts from; moves the frames of its panels to where the type needs them.
+/// The panels of each of `count` molds, in rising order.
+pub(crate) fn members_of(labels: &[usize], count: usize) -> Vec<Vec<usize>> {
+    let mut members = vec![Vec::new(); count];
+    for (p, &m) in labels.iter().enumerate() {
+        members[m].push(p);
+    }
+    members
+}
+
+/// The mold a cluster starts from, and its panels' frames moved to where the type needs them.
 fn first_mold(
     set: &PanelSet,
     panels: &[usize],
     kind: MoldType,
     slope_weight: f64,
-    poses: &mut [Pose],
-) -> Mold {
+    mut poses: Vec<Pose>,
+) -> (Mold, Vec<Pose>) {
     if kind == MoldType::Torus {
-        return first_torus(set, panels, slope_weight, poses);
+        return first_torus(set, panels, slope_weight);
     }
     let mut mold = Mold::flat(kind);
     let n = panels.len() as f64;
@@ -132,19 +157,17 @@ fn first_mold(
             let turn = k1.abs() < k2.abs();
             mold.parameters[0] = if turn { k2 } else { k1 };
             if turn {
-                for &p in panels {
-                    poses[p].rotation = quarter_turn(poses[p].rotation);
-                }
+                poses.iter_mut().for_each(|pose| pose.rotation = quarter_turn(pose.rotation));
             }
         }
         MoldType::Sphere => mold.parameters[0] = 0.5 * (k1 + k2),
         MoldType::Plane | MoldType::Paraboloid | MoldType::Torus | MoldType::Cubic => {}
     }
-    mold
+    (mold, poses)
 }
 
 /// The better of two tori, whose parallels run along the one or the other principal direction.
-fn first_torus(set: &PanelSet, panels: &[usize], slope_weight: f64, poses: &mut [Pose]) -> Mold {
+fn first_torus(set: &PanelSet, panels: &[usize], slope_weight: f64) -> (Mold, Vec<Pose>) {
     let starts = [true, false].map(|is_across| {
         let (mold, own) = torus_start::start(set, panels, slope_weight, is_across);
         let energy = |(&p, pose): (&usize, &Pose)| {
@@ -157,8 +180,5 @@ fn first_torus(set: &PanelSet, panels: &[usize], slope_weight: f64, poses: &mut 
     let [a, b] = starts;
     // NaN, a panel beyond the reach of the torus, loses.
     let (mold, own, _) = if b.2 < a.2 || a.2.is_nan() { b } else { a };
-    for (&p, pose) in panels.iter().zip(own) {
-        poses[p] = pose;
-    }
-    mold
+    (mold, own)
 }

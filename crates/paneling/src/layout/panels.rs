@@ -1,6 +1,6 @@
 //! Panels of a surface: sample points, normals, frames, and the seams between them.
 
-use crate::error::PanelingError;
+use crate::error::Error;
 use crate::layout::polygon::Corner;
 use crate::layout::tiling::Layout;
 use bspline::BsplineSurface;
@@ -94,8 +94,8 @@ impl PanelSet {
     /// Samples the panels of `layout` on `surface`.
     ///
     /// # Errors
-    /// [`PanelingError::Singular`] where the surface has no normal.
-    pub fn new(surface: &BsplineSurface, layout: &Layout) -> Result<Self, PanelingError> {
+    /// [`Error::Singular`] where the surface has no normal.
+    pub fn new(surface: &BsplineSurface, layout: &Layout) -> Result<Self, Error> {
         let (edges, uses) = edges_of(layout.panels());
         let (start_u, end_u) = surface.knots_u().domain();
         let (start_v, end_v) = surface.knots_v().domain();
@@ -318,11 +318,11 @@ fn sample(
     surface: &BsplineSurface,
     parameters: &[[f64; 2]],
     panel: impl Fn(usize) -> usize,
-) -> Result<Samples, PanelingError> {
+) -> Result<Samples, Error> {
     let jets = surface.jets(parameters, 1);
     let mut samples = Samples::default();
     for (k, jet) in jets.iter().enumerate() {
-        let normal = jet.normal().map_err(|_| PanelingError::Singular {
+        let normal = jet.normal().map_err(|_| Error::Singular {
             panel: panel(k),
             u: parameters[k][0],
             v: parameters[k][1],
@@ -335,7 +335,7 @@ fn sample(
 
 type Frames = (Vec<Pose>, Vec<[f64; 2]>);
 
-fn frames_at(surface: &BsplineSurface, middles: &[[f64; 2]]) -> Result<Frames, PanelingError> {
+fn frames_at(surface: &BsplineSurface, middles: &[[f64; 2]]) -> Result<Frames, Error> {
     let jets = surface.jets(middles, 2);
     let frame = |jet: &SurfaceJet| {
         let (first, second) = (jet.first_form(), jet.second_form()?);
@@ -352,7 +352,7 @@ fn frames_at(surface: &BsplineSurface, middles: &[[f64; 2]]) -> Result<Frames, P
     let mut curvatures = Vec::with_capacity(all.len());
     for (panel, result) in all.into_iter().enumerate() {
         let [u, v] = middles[panel];
-        let (pose, curvature) = result.map_err(|_| PanelingError::Singular { panel, u, v })?;
+        let (pose, curvature) = result.map_err(|_| Error::Singular { panel, u, v })?;
         frames.push(pose);
         curvatures.push(curvature);
     }

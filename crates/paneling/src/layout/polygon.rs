@@ -1,6 +1,6 @@
 //! Panels as polygons in the plane, and checks of them.
 
-use crate::error::PanelingError;
+use crate::error::Error;
 use std::collections::HashMap;
 
 /// A corner of a panel.
@@ -23,7 +23,7 @@ pub(crate) fn area(polygon: &[Corner]) -> f64 {
 }
 
 /// Refuses polygons that are not simple or turned over, or that overlap.
-pub(crate) fn check(panels: &[Vec<Corner>]) -> Result<(), PanelingError> {
+pub(crate) fn check(panels: &[Vec<Corner>]) -> Result<(), Error> {
     let mut edges: HashMap<(usize, usize), usize> = HashMap::new();
     for (face, panel) in panels.iter().enumerate() {
         let n = panel.len();
@@ -34,13 +34,13 @@ pub(crate) fn check(panels: &[Vec<Corner>]) -> Result<(), PanelingError> {
         };
         let repeats = || (0..n).any(|i| (i + 1..n).any(|j| panel[i].vertex == panel[j].vertex));
         if n < 3 || !(area(panel) > 0.0) || repeats() || crosses_itself() {
-            return Err(PanelingError::BadFace { face });
+            return Err(Error::BadFace { face });
         }
         for k in 0..n {
             let (from, to) = (panel[k].vertex, panel[(k + 1) % n].vertex);
             // Both lie to the left of the edge they share.
             if let Some(first) = edges.insert((from, to), face) {
-                return Err(PanelingError::Overlap { first, second: face });
+                return Err(Error::Overlap { first, second: face });
             }
         }
     }
@@ -48,7 +48,7 @@ pub(crate) fn check(panels: &[Vec<Corner>]) -> Result<(), PanelingError> {
 }
 
 /// Compares panels that share a cell of a grid about as fine as the panels.
-fn overlaps(panels: &[Vec<Corner>]) -> Result<(), PanelingError> {
+fn overlaps(panels: &[Vec<Corner>]) -> Result<(), Error> {
     let cells = (panels.len() as f64).sqrt().ceil().clamp(1.0, 2000.0) as usize;
     let mut buckets: HashMap<(usize, usize), Vec<usize>> = HashMap::new();
     let cell = |x: f64| ((x * cells as f64).max(0.0) as usize).min(cells - 1);
@@ -61,7 +61,7 @@ fn overlaps(panels: &[Vec<Corner>]) -> Result<(), PanelingError> {
                 let bucket = buckets.entry((i, j)).or_default();
                 for &other in bucket.iter() {
                     if overlap(&panels[other], panel) {
-                        return Err(PanelingError::Overlap { first: other, second: face });
+                        return Err(Error::Overlap { first: other, second: face });
                     }
                 }
                 bucket.push(face);

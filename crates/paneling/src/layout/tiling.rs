@@ -1,15 +1,18 @@
 //! Seam layouts: polygons over the unit square, which stands for the domain of the surface.
 
-use crate::error::PanelingError;
+use crate::error::Error;
 use crate::layout::polygon::{self, Corner};
 use bspline::BsplineSurface;
+use gp_solver::choices;
+use serde::{Deserialize, Serialize};
 use std::collections::HashMap;
 
 /// Most panels a layout may have: a slip of a digit should not fill the memory.
 pub const MAX_PANELS: usize = 4_000_000;
 
 /// The patterns that can be generated.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
 pub enum Pattern {
     /// Rows and columns of quads.
     #[default]
@@ -23,6 +26,14 @@ pub enum Pattern {
     /// Quads standing on their corners, with triangles along the borders.
     Diagonal,
 }
+
+choices!(Pattern {
+    Quad = "quad",
+    Staggered = "staggered",
+    Triangle = "triangle",
+    Hexagon = "hexagon",
+    Diagonal = "diagonal",
+});
 
 impl Pattern {
     /// All patterns.
@@ -92,29 +103,29 @@ impl Layout {
     /// either direction.
     ///
     /// # Errors
-    /// [`PanelingError`] if a count is zero, too large, or too small to go around.
+    /// [`Error`] if a count is zero, too large, or too small to go around.
     pub fn generate(
         pattern: Pattern,
         u: usize,
         v: usize,
         closed: [bool; 2],
-    ) -> Result<Self, PanelingError> {
+    ) -> Result<Self, Error> {
         if u == 0 || v == 0 {
-            return Err(PanelingError::NoPanels { u, v });
+            return Err(Error::NoPanels { u, v });
         }
         let panels = u.saturating_mul(v);
         if panels > MAX_PANELS {
-            return Err(PanelingError::TooManyPanels { panels, limit: MAX_PANELS });
+            return Err(Error::TooManyPanels { panels, limit: MAX_PANELS });
         }
         for (k, found) in [u, v].into_iter().enumerate() {
             let direction = ["u", "v"][k];
             // With fewer, two panels would share more than one edge or a panel meet itself.
             if closed[k] && found < 3 {
-                return Err(PanelingError::TooFewAround { direction, needed: 3, found });
+                return Err(Error::TooFewAround { direction, needed: 3, found });
             }
             let pairs = k == 1 && matches!(pattern, Pattern::Staggered | Pattern::Hexagon);
             if closed[k] && pairs && !found.is_multiple_of(2) {
-                return Err(PanelingError::OddAround { direction, found });
+                return Err(Error::OddAround { direction, found });
             }
         }
         let builder = match pattern {
@@ -130,26 +141,23 @@ impl Layout {
     /// A layout from polygons over the unit square: `vertices[i]` is `(u, v, z)` with `z = 0`.
     ///
     /// # Errors
-    /// [`PanelingError`] names the first vertex, face or edge at fault: not planar, outside the
+    /// [`Error`] names the first vertex, face or edge at fault: not planar, outside the
     /// unit square, not simple, turned over, or overlapping.
     ///
     /// # Panics
     /// If a face names a vertex that does not exist.
-    pub fn from_polygons(
-        vertices: &[[f64; 3]],
-        faces: &[Vec<usize>],
-    ) -> Result<Self, PanelingError> {
+    pub fn from_polygons(vertices: &[[f64; 3]], faces: &[Vec<usize>]) -> Result<Self, Error> {
         let size = vertices.iter().flat_map(|p| [p[0].abs(), p[1].abs()]).fold(0.0_f64, f64::max);
         for (vertex, &[u, v, z]) in vertices.iter().enumerate() {
             if !(z.abs() <= 1e-9 * size.max(1e-300)) {
-                return Err(PanelingError::NotPlanar { vertex, z });
+                return Err(Error::NotPlanar { vertex, z });
             }
             if !((-1e-9..=1.0 + 1e-9).contains(&u) && (-1e-9..=1.0 + 1e-9).contains(&v)) {
-                return Err(PanelingError::OutsideDomain { vertex, u, v });
+                return Err(Error::OutsideDomain { vertex, u, v });
             }
         }
         if faces.is_empty() {
-            return Err(PanelingError::NoPanels { u: 0, v: 0 });
+            return Err(Error::NoPanels { u: 0, v: 0 });
         }
         let corner = |&vertex: &usize| {
             let [u, v, _] = vertices[vertex];
@@ -391,20 +399,17 @@ mod tests {
         assert_eq!(from(&square, &[&[3, 2, 1, 0]]).unwrap().len(), 1, "turned over as a whole");
         let mut raised = square;
         raised[2][2] = 0.5;
-        assert!(matches!(
-            from(&raised, &[&[0, 1, 2, 3]]),
-            Err(PanelingError::NotPlanar { vertex: 2, .. })
-        ));
+        assert!(matches!(from(&raised, &[&[0, 1, 2, 3]]), Err(Error::NotPlanar { vertex: 2, .. })));
         let mut far = square;
         far[1][0] = 1.5;
         assert!(matches!(
             from(&far, &[&[0, 1, 2, 3]]),
-            Err(PanelingError::OutsideDomain { vertex: 1, .. })
+            Err(Error::OutsideDomain { vertex: 1, .. })
         ));
-        assert!(matches!(from(&square, &[&[0, 1, 3, 2]]), Err(PanelingError::BadFace { face: 0 })));
+        assert!(matches!(from(&square, &[&[0, 1, 3, 2]]), Err(Error::BadFace { face: 0 })));
         let overlapping = from(&square, &[&[0, 1, 2], &[0, 1, 3]]);
-        assert!(matches!(overlapping, Err(PanelingError::Overlap { .. })));
-        assert!(matches!(from(&square, &[]), Err(PanelingError::NoPanels { .. })));
+        assert!(matches!(overlapping, Err(Error::Overlap { .. })));
+        assert!(matches!(from(&square, &[]), Err(Error::NoPanels { .. })));
     }
 
     #[test]

@@ -1,6 +1,6 @@
 //! What molds and panels cost.
 
-use crate::error::PanelingError;
+use crate::error::Error;
 use crate::mold::shape::MoldType;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -39,14 +39,13 @@ impl PriceList {
     /// Checks that every one of `types` has a usable price.
     ///
     /// # Errors
-    /// [`PanelingError::NoPrice`] or [`PanelingError::BadPrice`] names the type.
-    pub fn check(&self, types: &[MoldType]) -> Result<(), PanelingError> {
+    /// [`Error::NoPrice`] or [`Error::BadPrice`] names the type.
+    pub fn check(&self, types: &[MoldType]) -> Result<(), Error> {
         for kind in types {
-            let price =
-                self.prices.get(kind).ok_or(PanelingError::NoPrice { kind: kind.name() })?;
+            let price = self.prices.get(kind).ok_or(Error::NoPrice { kind: kind.name() })?;
             for value in [price.mold, price.panel] {
                 if !(value >= 0.0 && value.is_finite()) {
-                    return Err(PanelingError::BadPrice { kind: kind.name(), value });
+                    return Err(Error::BadPrice { kind: kind.name(), value });
                 }
             }
         }
@@ -73,7 +72,7 @@ mod tests {
         list.prices.remove(&MoldType::Torus);
         assert!(matches!(
             list.check(&[MoldType::Plane]),
-            Err(PanelingError::BadPrice { kind: "plane", .. })
+            Err(Error::BadPrice { kind: "plane", .. })
         ));
         let error = list.check(&[MoldType::Cubic, MoldType::Torus]).unwrap_err();
         assert_eq!(

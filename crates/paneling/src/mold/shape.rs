@@ -1,5 +1,6 @@
 //! Mold shapes: height functions over the tangent plane of a mold's own frame.
 
+use gp_solver::{ListItem, OptionValue, choices};
 use numerics::Taylor;
 use serde::{Deserialize, Serialize};
 
@@ -23,6 +24,20 @@ pub enum MoldType {
     Cubic,
 }
 
+choices!(MoldType {
+    Plane = "plane",
+    Cylinder = "cylinder",
+    Sphere = "sphere",
+    Paraboloid = "paraboloid",
+    Torus = "torus",
+    Cubic = "cubic",
+});
+
+impl ListItem for MoldType {
+    const BETWEEN: char = ',';
+    const LIST_FORM: &'static str = "TYPE,...";
+}
+
 impl MoldType {
     /// All kinds, from the simplest to the most general.
     pub const ALL: [Self; 6] =
@@ -39,12 +54,6 @@ impl MoldType {
             Self::Torus => "torus",
             Self::Cubic => "cubic",
         }
-    }
-
-    /// The kind of this name.
-    #[must_use]
-    pub fn from_name(name: &str) -> Option<Self> {
-        Self::ALL.into_iter().find(|t| t.name() == name)
     }
 
     /// Number of free parameters of the shape.
@@ -64,7 +73,7 @@ impl std::str::FromStr for MoldType {
     type Err = String;
 
     fn from_str(name: &str) -> Result<Self, String> {
-        Self::from_name(name).ok_or_else(|| {
+        Self::read(name).map_err(|_| {
             let known = Self::ALL.map(Self::name).join(", ");
             format!("unknown mold type `{name}`; use {known}")
         })

@@ -1,6 +1,6 @@
 //! Flat outlines of panels on planar and cylindrical molds, to be cut from sheets and bent.
 
-use crate::error::PanelingError;
+use crate::error::Error;
 use crate::layout::panels::PanelSet;
 use crate::mold::shape::{Mold, MoldType};
 use crate::paneling::Paneling;
@@ -96,15 +96,15 @@ impl Paneling {
     /// with a grain can be used.
     ///
     /// # Errors
-    /// [`PanelingError::SheetTooSmall`] names the first panel that is larger than a sheet,
-    /// [`PanelingError::BadOption`] a sheet without area.
+    /// [`Error::SheetTooSmall`] names the first panel that is larger than a sheet,
+    /// [`Error::BadOption`] a sheet without area.
     pub fn flat_panels(
         &self,
         set: &PanelSet,
         sheet: Option<[f64; 2]>,
-    ) -> Result<FlatSheets, PanelingError> {
+    ) -> Result<FlatSheets, Error> {
         if let Some(&value) = sheet.iter().flatten().find(|v| !(**v > 0.0 && v.is_finite())) {
-            return Err(PanelingError::BadOption { name: "a side of the sheet", value });
+            return Err(Error::BadOption { name: "sheet", value });
         }
         let mut order: Vec<usize> = (0..set.len()).collect();
         // A stable sort: panels of a mold keep their order.
@@ -123,7 +123,7 @@ impl Paneling {
         for (flat, size) in panels.iter_mut().zip(&sizes) {
             if !(size.x + 2.0 * spacing <= width && size.y + 2.0 * spacing <= height) {
                 let size = [size.x + 2.0 * spacing, size.y + 2.0 * spacing];
-                return Err(PanelingError::SheetTooSmall {
+                return Err(Error::SheetTooSmall {
                     panel: flat.panel,
                     size,
                     sheet: [width, height],
@@ -212,7 +212,7 @@ fn bounds(points: &[DVec2]) -> (DVec2, DVec2) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{Layout, Options, Pattern, panel};
+    use crate::{Layout, Options, Pattern, solve};
     use fixtures::surfaces::Shape;
     use geom_core::{DVec3, assert_close};
 
@@ -220,8 +220,7 @@ mod tests {
         let roof = Shape::Roof.surface(10, 10, 4, 4);
         let layout = Layout::generate(Pattern::Hexagon, 5, 5, [false; 2]).unwrap();
         let set = PanelSet::new(&roof, &layout).unwrap();
-        let options = Options { mold_type: kind, ..Options::with_molds(6) };
-        let result = panel(&set, &options).unwrap();
+        let result = solve(&set, &Options::with_molds(6, kind), &mut ()).unwrap().result;
         (set, result)
     }
 
@@ -285,8 +284,8 @@ mod tests {
         let (m, n) = (4, 2);
         let layout = Layout::generate(Pattern::Quad, m, n, [false; 2]).unwrap();
         let set = PanelSet::new(&surface, &layout).unwrap();
-        let options = Options { mold_type: MoldType::Cylinder, ..Options::with_molds(1) };
-        let result = panel(&set, &options).unwrap();
+        let options = Options::with_molds(1, MoldType::Cylinder);
+        let result = solve(&set, &options, &mut ()).unwrap().result;
         let flat = result.flat_panels(&set, None).unwrap().panels;
         let mut total = 0.0;
         for panel in &flat {
@@ -335,7 +334,7 @@ mod tests {
         let error = result.flat_panels(&set, Some([0.01 * size, size])).unwrap_err().to_string();
         assert!(error.starts_with("panel ") && error.contains("larger sheet"), "{error}");
         let error = result.flat_panels(&set, Some([-1.0, size])).unwrap_err();
-        assert!(matches!(error, PanelingError::BadOption { .. }));
+        assert!(matches!(error, Error::BadOption { .. }));
         let (set, result) = paneling(MoldType::Sphere);
         assert_eq!(result.flat_panels(&set, None).unwrap(), FlatSheets::default());
     }

@@ -8,118 +8,255 @@ use crate::fit::residuals::foot;
 use crate::fit::retraction::moved_on;
 use crate::fit::state::{EXACT, Fit};
 use crate::layout::panels::{PanelSet, SEAM_SAMPLES, Seam};
-use crate::seam::system::{SeamOptions, System, Unknowns};
-use rayon::prelude::*;
+use crate::pulse::{Pulse, Stop};
+use crate::seam::system::{Solution, System};
+use crate::seam::unknowns::{Seams, parts};
+use gp_solver::{
+    Attempt, ConjugateGradients, DampedModel, DampingPolicy, SolverError, Status, Verdict,
+    damped_step,
+};
 
 /// Damping of the first step, a share of the diagonal.
 const FIRST_DAMPING: f64 = 1e-2;
-const LEAST_DAMPING: f64 = 1e-8;
-const MOST_DAMPING: f64 = 1e4;
-/// Refused steps in a row after which nothing can be gained.
-const TRIES: usize = 4;
 
-/// Lowers kinks and gaps of a fit; returns the energy before and after every accepted step.
-///
-/// `weights` has one factor per seam for its part of the energy.
-pub(crate) fn improve(
-    set: &PanelSet,
-    fit: &mut Fit,
-    options: &SeamOptions,
-    weights: &[f64],
-) -> Vec<f64> {
-    assert_eq!(weights.len(), set.seams.len(), "one weight per seam");
-    let incident = set.incident_seams();
-    let mut energy = Energy::new(set, fit, options, weights);
-    let mut history = vec![energy.total];
-    let mut damping = vec![FIRST_DAMPING; fit.molds.len()];
-    let mut step = 0;
-    let exact = EXACT * set.edges.points.len() as f64;
-    while step < options.steps && energy.total > exact {
-        let system = System::linearize(set, fit, options, weights, &incident);
-        let mut accepted = false;
+/// Seam steps between two of them.
+#[derive(Clone, Debug)]
+pub(crate) struct SeamRun {
+    /// Damping of every mold and its panels.
+    pub(crate) damping: Vec<f64>,
+    /// Steps tried, those that were refused included.
+    pub(crate) tries: usize,
+    /// Energy at the start and after every step.
+    pub(crate) history: Vec<f64>,
+    /// How it ended, once it has.
+    pub(crate) status: Option<Status>,
+    energy: Energy,
+}
+
+impl SeamRun {
+    /// Begins at `fit`; `None` if asked to stop.
+    pub(crate) fn new(seams: Seams<'_>, fit: &Fit, pulse: &Pulse<'_>) -> Option<Self> {
+        assert_eq!(seams.weights.len(), seams.set.seams.len(), "one weight per seam");
+        let energy = Energy::new(seams, fit, pulse)?;
+        let damping = vec![FIRST_DAMPING; fit.molds.len()];
+        let history = vec![energy.total];
+        Some(Self { damping, tries: 0, history, status: None, energy })
+    }
+
+    /// Goes on from a step before; `None` if asked to stop.
+    pub(crate) fn resumed(
+        seams: Seams<'_>,
+        fit: &Fit,
+        (damping, tries, history): (Vec<f64>, usize, Vec<f64>),
+        pulse: &Pulse<'_>,
+    ) -> Option<Self> {
+        Some(Self { damping, tries, history, ..Self::new(seams, fit, pulse)? })
+    }
+
+    /// Takes one step that lowers the energy of `fit`, or sets the status that says why there is
+    /// none. The status may come with the last step. An interrupted step changes nothing.
+    pub(crate) fn step(
+        &mut self,
+        seams: Seams<'_>,
+        fit: &mut Fit,
+        solver: &mut ConjugateGradients,
+        pulse: &Pulse<'_>,
+    ) {
+        if self.energy.total <= EXACT * seams.set.edges.points.len() as f64 {
+            self.status = Some(Status::Converged);
+            return;
+        }
+        if self.tries >= seams.options.steps {
+            self.status = Some(Status::IterationLimit);
+            return;
+        }
+        let Some(system) = System::linearize(seams, fit, pulse) else {
+            self.status = Some(Status::Interrupted);
+            return;
+        };
         // A refused step is tried again with more damping on the same linearisation.
-        for _ in 0..TRIES {
-            let solution = system.solve(fit, &damping);
-            let mut trial = applied(set, fit, &solution.step);
-            let mut next = Energy::new(set, &trial, options, weights);
-            let worse = energy.adapt(&next, &solution.promised, &mut damping);
-            if worse.contains(&true) {
-                // A few molds that went astray should not cost the others their step.
-                let part = without(&trial, fit, &worse);
-                let part_energy = Energy::new(set, &part, options, weights);
-                if !(next.total <= part_energy.total) {
-                    (trial, next) = (part, part_energy);
-                }
-            }
-            step += 1;
-            let (before, cg) = (energy.total, solution.iterations);
-            tracing::debug!(step, before, energy = next.total, cg, "seam step");
-            accepted = next.total < before;
-            if accepted {
-                *fit = trial;
-                energy = next;
-                history.push(energy.total);
-                if energy.total > (1.0 - options.stall) * before {
-                    step = options.steps;
-                }
-                break;
-            }
-        }
-        if !accepted {
-            break;
+        let mut damping = self.damping.clone();
+        let mut policy = PerMold::default();
+        let energy = &self.energy;
+        let mut model = SeamModel { seams, fit, system, energy, solver, pulse, tried: None };
+        let result = damped_step(&mut model, &mut policy, &mut damping, &mut Stop(pulse));
+        let tried = model.tried;
+        let (Ok(Ok(accepted)), Some(tried)) = (&result, tried) else {
+            let status = match result {
+                Ok(Err(status)) => status,
+                _ => Status::Stalled,
+            };
+            self.status = Some(status);
+            return;
+        };
+        let before = self.energy.total;
+        *fit = tried.fit;
+        self.energy = tried.energy;
+        self.damping = damping;
+        self.tries += accepted.attempts;
+        self.history.push(self.energy.total);
+        if self.energy.total > (1.0 - seams.options.stall) * before {
+            self.status = Some(Status::Converged);
         }
     }
-    fit.energies = (0..set.len()).into_par_iter().map(|p| fit.panel_energy(set, p)).collect();
-    history
 }
 
-/// The energy, and the part of it that each mold is to blame for.
-struct Energy {
-    total: f64,
-    molds: Vec<f64>,
+/// A fit linearised for a step of all its poses and molds; every mold with its panels is a group.
+struct SeamModel<'m, 'o> {
+    seams: Seams<'m>,
+    fit: &'m Fit,
+    system: System<'m>,
+    energy: &'m Energy,
+    solver: &'m mut ConjugateGradients,
+    pulse: &'m Pulse<'o>,
+    /// The last attempt; none if it was interrupted.
+    tried: Option<Tried>,
 }
 
-impl Energy {
-    fn new(set: &PanelSet, fit: &Fit, options: &SeamOptions, weights: &[f64]) -> Self {
-        let seams: Vec<f64> = set
-            .seams
-            .par_iter()
-            .zip(weights)
-            .with_min_len(64)
-            .map(|(seam, weight)| weight * seam_energy(set, fit, seam, options.gap_weight))
-            .collect();
-        let design: Vec<f64> = (0..set.len())
-            .into_par_iter()
-            .with_min_len(64)
-            .map(|p| fit.panel_energy(set, p))
-            .collect();
-        let weight = options.design_weight * options.design_weight;
-        let total = seams.iter().sum::<f64>() + weight * design.iter().sum::<f64>();
-        let mut molds = vec![0.0; fit.molds.len()];
-        for (seam, energy) in set.seams.iter().zip(&seams) {
-            seam.panels.iter().for_each(|&p| molds[fit.labels[p]] += 0.5 * energy);
-        }
-        for (energy, &label) in design.iter().zip(&fit.labels) {
-            molds[label] += weight * energy;
-        }
-        Self { total, molds }
+/// Where a step leads.
+struct Tried {
+    fit: Fit,
+    energy: Energy,
+    promised: Vec<f64>,
+    length: f64,
+}
+
+impl SeamModel<'_, '_> {
+    fn try_step(&mut self, damping: &[f64]) -> Option<Tried> {
+        let Solution { step, promised, report } =
+            self.system.solve(damping, self.solver, self.pulse);
+        let fit = applied(self.seams.set, self.fit, &step, self.pulse)?;
+        let energy = Energy::new(self.seams, &fit, self.pulse)?;
+        let (before, cg) = (self.energy.total, report.iterations);
+        tracing::debug!(before, energy = energy.total, cg, "seam step");
+        let length = step.iter().map(|s| s * s).sum::<f64>().sqrt();
+        Some(Tried { fit, energy, promised, length })
     }
 
-    /// Damps molds that got worse and frees those that got better as promised; returns which got
-    /// worse. One damping for all would let the worst of many molds hold back the rest.
-    fn adapt(&self, next: &Self, promised: &[f64], damping: &mut [f64]) -> Vec<bool> {
-        let molds = self.molds.iter().zip(&next.molds).zip(promised).zip(damping);
+    /// What the step that was tried last brings.
+    fn attempt_of(&self, tried: &Tried) -> Attempt {
+        Attempt {
+            predicted: tried.promised.iter().sum(),
+            decrease: self.energy.total - tried.energy.total,
+            length: tried.length,
+        }
+    }
+
+    /// A few molds that went astray should not cost the others their step: puts them and their
+    /// panels back where they were, if that is better.
+    fn put_back(&mut self, astray: &[bool]) {
+        let Some(tried) = &mut self.tried else { return };
+        let part = without(&tried.fit, self.fit, astray);
+        let Some(energy) = Energy::new(self.seams, &part, self.pulse) else { return };
+        if !(tried.energy.total <= energy.total) {
+            tried.fit = part;
+            tried.energy = energy;
+        }
+    }
+}
+
+impl DampedModel for SeamModel<'_, '_> {
+    fn attempt(&mut self, damping: &[f64]) -> Result<Attempt, SolverError> {
+        self.tried = self.try_step(damping);
+        // Interrupted: cannot be judged, and the loop asks the observer before the next attempt.
+        let unknown = Attempt { decrease: f64::NAN, ..Attempt::default() };
+        Ok(self.tried.as_ref().map_or(unknown, |tried| self.attempt_of(tried)))
+    }
+}
+
+/// Damps molds that got worse and frees those that got better as promised. One damping for all
+/// would let the worst of many molds hold back the rest.
+struct PerMold {
+    /// How the damping of a mold grows that got worse.
+    worse: f64,
+    /// Nielsen's rule frees a mold at most by this factor.
+    freed: f64,
+    least: f64,
+    most: f64,
+    /// Refused steps in a row after which nothing can be gained.
+    tries: usize,
+}
+
+impl Default for PerMold {
+    fn default() -> Self {
+        Self { worse: 8.0, freed: 0.2, least: 1e-8, most: 1e4, tries: 4 }
+    }
+}
+
+impl PerMold {
+    /// Changes the damping of every mold; returns which got worse.
+    fn adapt(&self, before: &Energy, tried: &Tried, damping: &mut [f64]) -> Vec<bool> {
+        let molds = before.molds.iter().zip(&tried.energy.molds).zip(&tried.promised).zip(damping);
         molds
             .map(|(((before, after), promised), d)| {
                 // NaN, a panel beyond the reach of a round mold, counts as worse.
                 let is_worse = !(after <= before);
                 // Nielsen's rule.
                 let gain = ((before - after) / promised).clamp(0.0, 1.0);
-                let factor = if is_worse { 8.0 } else { 1.0 - (2.0 * gain - 1.0).powi(3) };
-                *d = (*d * factor.max(0.2)).clamp(LEAST_DAMPING, MOST_DAMPING);
+                let factor = if is_worse { self.worse } else { 1.0 - (2.0 * gain - 1.0).powi(3) };
+                *d = (*d * factor.max(self.freed)).clamp(self.least, self.most);
                 is_worse
             })
             .collect()
+    }
+}
+
+impl DampingPolicy<SeamModel<'_, '_>> for PerMold {
+    fn judge(
+        &mut self,
+        model: &mut SeamModel<'_, '_>,
+        _: &Attempt,
+        damping: &mut [f64],
+    ) -> Verdict {
+        let Some(tried) = &model.tried else { return Verdict::Retry };
+        let astray = self.adapt(model.energy, tried, damping);
+        if astray.contains(&true) {
+            model.put_back(&astray);
+        }
+        let Some(tried) = &model.tried else { return Verdict::Retry };
+        let attempt = model.attempt_of(tried);
+        self.tries -= 1;
+        // NaN is refused too.
+        if attempt.decrease > 0.0 {
+            Verdict::AcceptChanged(attempt)
+        } else if self.tries > 0 {
+            Verdict::Retry
+        } else {
+            Verdict::End(Status::Stalled)
+        }
+    }
+
+    fn mend(&mut self, _: &mut SeamModel<'_, '_>, _: &mut [f64]) -> Verdict {
+        // Conjugate gradients end early where the matrix is not positive definite.
+        Verdict::End(Status::Stalled)
+    }
+}
+
+/// The energy, and the part of it that each mold is to blame for.
+#[derive(Clone, Debug)]
+pub(crate) struct Energy {
+    pub(crate) total: f64,
+    molds: Vec<f64>,
+}
+
+impl Energy {
+    /// `None` if asked to stop.
+    pub(crate) fn new(seams: Seams<'_>, fit: &Fit, pulse: &Pulse<'_>) -> Option<Self> {
+        let Seams { set, options, weights, .. } = seams;
+        let of_seams = pulse.map(set.seams.len(), 64, |s| {
+            weights[s] * seam_energy(set, fit, &set.seams[s], options.gap_weight)
+        })?;
+        let of_panels = pulse.map(set.len(), 64, |p| fit.panel_energy(set, p))?;
+        let weight = options.design_weight * options.design_weight;
+        let total = of_seams.iter().sum::<f64>() + weight * of_panels.iter().sum::<f64>();
+        let mut molds = vec![0.0; fit.molds.len()];
+        for (seam, energy) in set.seams.iter().zip(&of_seams) {
+            seam.panels.iter().for_each(|&p| molds[fit.labels[p]] += 0.5 * energy);
+        }
+        for (energy, &label) in of_panels.iter().zip(&fit.labels) {
+            molds[label] += weight * energy;
+        }
+        Some(Self { total, molds })
     }
 }
 
@@ -155,18 +292,15 @@ fn seam_energy(set: &PanelSet, fit: &Fit, seam: &Seam, gap_weight: f64) -> f64 {
     sum
 }
 
-fn applied(set: &PanelSet, fit: &Fit, change: &Unknowns) -> Fit {
+fn applied(set: &PanelSet, fit: &Fit, step: &[f64], pulse: &Pulse<'_>) -> Option<Fit> {
+    let (poses, molds) = parts(step, set.len());
     let mut trial = fit.clone();
-    for (mold, step) in trial.molds.iter_mut().zip(&change.molds) {
+    for (mold, step) in trial.molds.iter_mut().zip(molds) {
         mold.parameters.iter_mut().zip(step).for_each(|(p, s)| *p += s);
     }
-    trial.poses = (0..set.len())
-        .into_par_iter()
-        .with_min_len(64)
-        .map(|p| {
-            let m = fit.labels[p];
-            moved_on(set, p, &fit.poses[p], &change.poses[p], &fit.molds[m], &trial.molds[m])
-        })
-        .collect();
-    trial
+    trial.poses = pulse.map(set.len(), 64, |p| {
+        let m = fit.labels[p];
+        moved_on(set, p, &fit.poses[p], &poses[p], &fit.molds[m], &trial.molds[m])
+    })?;
+    Some(trial)
 }

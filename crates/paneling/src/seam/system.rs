@@ -9,92 +9,22 @@ use crate::fit::residuals::{POSE, SIDE, seam_side};
 use crate::fit::state::Fit;
 use crate::layout::panels::{PanelSet, SEAM_SAMPLES};
 use crate::mold::shape::MAX_PARAMETERS;
+use crate::pulse::{Pulse, Stop};
+use crate::seam::unknowns::{Seams, dot, parts, parts_mut};
+use gp_solver::{CgOptions, CgReport, ConjugateGradients, LinearOperator, Preconditioner};
 use numerics::{PIVOT_RATIO, factor_semidefinite, solve_semidefinite};
 use rayon::prelude::*;
 
 /// Rows of a seam: a gap and two components of the kink per sample.
 const ROWS: usize = 3 * SEAM_SAMPLES;
-/// Relative residual at which the conjugate gradients stop.
-const CG_TOLERANCE: f64 = 0.03;
-/// Most conjugate gradient steps per linearisation.
-const CG_STEPS: usize = 40;
-
-/// Settings of the joint seam step.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct SeamOptions {
-    /// Most Gauss-Newton steps.
-    pub(crate) steps: usize,
-    /// Weight of a gap in units of the panel size, against a kink in radians.
-    pub(crate) gap_weight: f64,
-    /// Weight of the distance to the design against the seams.
-    pub(crate) design_weight: f64,
-    /// Ends when a step lowers the energy by less than this share.
-    pub(crate) stall: f64,
-}
-
-/// A point of the space of all poses and molds.
-#[derive(Clone)]
-pub(crate) struct Unknowns {
-    pub(crate) poses: Vec<[f64; POSE]>,
-    pub(crate) molds: Vec<[f64; MAX_PARAMETERS]>,
-}
-
-impl Unknowns {
-    fn zero(poses: usize, molds: usize) -> Self {
-        Self { poses: vec![[0.0; POSE]; poses], molds: vec![[0.0; MAX_PARAMETERS]; molds] }
-    }
-
-    fn dot(&self, other: &Self) -> f64 {
-        // Serial and in order: the same for every number of threads.
-        let poses: f64 = self
-            .poses
-            .iter()
-            .zip(&other.poses)
-            .map(|(a, b)| a.iter().zip(b).map(|(x, y)| x * y).sum::<f64>())
-            .sum();
-        let molds: f64 = self
-            .molds
-            .iter()
-            .zip(&other.molds)
-            .map(|(a, b)| a.iter().zip(b).map(|(x, y)| x * y).sum::<f64>())
-            .sum();
-        poses + molds
-    }
-
-    /// `self += diagonal · other`, entry by entry.
-    fn add_scaled_by(&mut self, diagonal: &Self, other: &Self) {
-        for ((q, d), v) in self.poses.iter_mut().zip(&diagonal.poses).zip(&other.poses) {
-            q.iter_mut().zip(d).zip(v).for_each(|((q, d), v)| *q += d * v);
-        }
-        for ((q, d), v) in self.molds.iter_mut().zip(&diagonal.molds).zip(&other.molds) {
-            q.iter_mut().zip(d).zip(v).for_each(|((q, d), v)| *q += d * v);
-        }
-    }
-
-    /// `self = factor · self + other`.
-    fn scale_and_add(&mut self, factor: f64, other: &Self) {
-        for (a, b) in self.poses.iter_mut().zip(&other.poses) {
-            a.iter_mut().zip(b).for_each(|(x, y)| *x = factor * *x + y);
-        }
-        for (a, b) in self.molds.iter_mut().zip(&other.molds) {
-            a.iter_mut().zip(b).for_each(|(x, y)| *x = factor * *x + y);
-        }
-    }
-
-    /// `self += factor · other`.
-    fn add(&mut self, factor: f64, other: &Self) {
-        for (a, b) in self.poses.iter_mut().zip(&other.poses) {
-            a.iter_mut().zip(b).for_each(|(x, y)| *x += factor * y);
-        }
-        for (a, b) in self.molds.iter_mut().zip(&other.molds) {
-            a.iter_mut().zip(b).for_each(|(x, y)| *x += factor * y);
-        }
-    }
-}
+/// Conjugate gradients per linearisation: Gauss-Newton needs no more than a good direction.
+const CG: CgOptions = CgOptions { rel_tol: 0.03, max_iterations: 40 };
 
 /// The Gauss-Newton system at one iterate.
 pub(crate) struct System<'a> {
     set: &'a PanelSet,
+    labels: &'a [usize],
+    molds: usize,
     incident: &'a [Vec<(usize, usize)>],
     /// `couplings[s]` is `J₀ᵀ J₁` of the two sides of seam `s`.
     couplings: Vec<Matrix>,
@@ -106,10 +36,10 @@ pub(crate) struct System<'a> {
 
 /// An approximate solution of the damped system.
 pub(crate) struct Solution {
-    pub(crate) step: Unknowns,
+    pub(crate) step: Vec<f64>,
     /// By how much the energy would fall if it were quadratic, by mold.
     pub(crate) promised: Vec<f64>,
-    pub(crate) iterations: usize,
+    pub(crate) report: CgReport,
 }
 
 /// A seam's share of the system.
@@ -120,39 +50,45 @@ struct SeamPart {
 }
 
 impl<'a> System<'a> {
-    /// The system at `fit`; `incident` as of [`PanelSet::incident_seams`].
-    pub(crate) fn linearize(
-        set: &'a PanelSet,
-        fit: &Fit,
-        options: &SeamOptions,
-        weights: &[f64],
-        incident: &'a [Vec<(usize, usize)>],
-    ) -> Self {
-        let seams: Vec<SeamPart> = (0..set.seams.len())
-            .into_par_iter()
-            .with_min_len(16)
-            .map(|s| seam_part(set, fit, s, options.gap_weight, weights[s]))
-            .collect();
+    /// The system at `fit`; `None` if asked to stop.
+    pub(crate) fn linearize(seams: Seams<'a>, fit: &'a Fit, pulse: &Pulse<'_>) -> Option<Self> {
+        let Seams { set, options, weights, incident } = seams;
+        let parts = pulse
+            .map(set.seams.len(), 16, |s| seam_part(set, fit, s, options.gap_weight, weights[s]))?;
         let weight = options.design_weight * options.design_weight;
-        let (blocks, sides) = (0..set.len())
-            .into_par_iter()
-            .with_min_len(16)
-            .map_init(Vec::new, |rows, p| {
-                let mold = &fit.molds[fit.labels[p]];
-                let (mut block, mut side) =
-                    design_block(set, p, mold, &fit.poses[p], fit.slope_weight, rows);
-                block.iter_mut().flatten().chain(&mut side).for_each(|v| *v *= weight);
-                for &(s, k) in &incident[p] {
-                    for (row, own) in block.iter_mut().zip(&seams[s].own[k]) {
-                        row.iter_mut().zip(own).for_each(|(a, b)| *a += b);
-                    }
-                    side.iter_mut().zip(&seams[s].sides[k]).for_each(|(a, b)| *a += b);
+        let panels = pulse.map_with(set.len(), 16, Vec::new, |rows, p| {
+            let mold = &fit.molds[fit.labels[p]];
+            let (mut block, mut side) =
+                design_block(set, p, mold, &fit.poses[p], fit.slope_weight, rows);
+            block.iter_mut().flatten().chain(&mut side).for_each(|v| *v *= weight);
+            for &(s, k) in &incident[p] {
+                for (row, own) in block.iter_mut().zip(&parts[s].own[k]) {
+                    row.iter_mut().zip(own).for_each(|(a, b)| *a += b);
                 }
-                (block, side)
-            })
-            .unzip();
-        let couplings = seams.into_iter().map(|s| s.coupling).collect();
-        Self { set, incident, couplings, blocks, sides }
+                side.iter_mut().zip(&parts[s].sides[k]).for_each(|(a, b)| *a += b);
+            }
+            (block, side)
+        })?;
+        let (blocks, sides) = panels.into_iter().unzip();
+        let couplings = parts.into_iter().map(|s| s.coupling).collect();
+        let (labels, molds) = (&fit.labels[..], fit.molds.len());
+        Some(Self { set, labels, molds, incident, couplings, blocks, sides })
+    }
+
+    /// Number of unknowns.
+    fn unknowns(&self) -> usize {
+        POSE * self.blocks.len() + MAX_PARAMETERS * self.molds
+    }
+
+    /// Minus the gradient of half the energy.
+    pub(crate) fn side(&self) -> Vec<f64> {
+        let mut out = vec![0.0; self.unknowns()];
+        let (poses, molds) = parts_mut(&mut out, self.blocks.len());
+        for ((side, pose), &label) in self.sides.iter().zip(poses).zip(self.labels) {
+            pose.copy_from_slice(&side[..POSE]);
+            molds[label].iter_mut().zip(&side[POSE..]).for_each(|(o, v)| *o += v);
+        }
+        out
     }
 
     /// The entries of one panel in a product with the normal matrix.
@@ -171,80 +107,90 @@ impl<'a> System<'a> {
         sum
     }
 
-    /// Applies the normal matrix without damping.
-    fn apply(&self, fit: &Fit, x: &Unknowns, out: &mut Unknowns) {
-        let values = |p: usize| {
-            let mut values = [0.0; SIDE];
-            values[..POSE].copy_from_slice(&x.poses[p]);
-            values[POSE..].copy_from_slice(&x.molds[fit.labels[p]]);
-            values
-        };
-        let parts: Vec<[f64; MAX_PARAMETERS]> = out
-            .poses
-            .par_iter_mut()
-            .with_min_len(64)
-            .enumerate()
-            .map(|(p, pose)| {
-                let sum = pulp::Arch::new().dispatch(|| self.product_of(p, values));
-                pose.copy_from_slice(&sum[..POSE]);
-                let mut mold = [0.0; MAX_PARAMETERS];
-                mold.copy_from_slice(&sum[POSE..]);
-                mold
-            })
-            .collect();
-        // In the order of the panels: the same for every number of threads.
-        out.molds.iter_mut().for_each(|m| *m = [0.0; MAX_PARAMETERS]);
-        for (part, &label) in parts.iter().zip(&fit.labels) {
-            out.molds[label].iter_mut().zip(part).for_each(|(o, v)| *o += v);
-        }
-    }
-
     /// The step `(A + damping · diag A) x = −g` by preconditioned conjugate gradients; `damping` has
     /// a share for each mold and its panels.
-    pub(crate) fn solve(&self, fit: &Fit, damping: &[f64]) -> Solution {
-        let preconditioner = Arrows::new(&self.blocks, fit, damping);
-        let mut r = Unknowns::zero(self.blocks.len(), fit.molds.len());
-        for (p, side) in self.sides.iter().enumerate() {
-            r.poses[p].copy_from_slice(&side[..POSE]);
-            let mold = &mut r.molds[fit.labels[p]];
-            mold.iter_mut().zip(&side[POSE..]).for_each(|(o, v)| *o += v);
+    pub(crate) fn solve(
+        &self,
+        damping: &[f64],
+        solver: &mut ConjugateGradients,
+        pulse: &Pulse<'_>,
+    ) -> Solution {
+        let (mut preconditioner, diagonal) = Arrows::new(self, damping);
+        let side = self.side();
+        let mut step = vec![0.0; self.unknowns()];
+        let mut operator = Damped {
+            system: self,
+            diagonal: &diagonal,
+            shares: vec![[0.0; MAX_PARAMETERS]; self.blocks.len()],
+        };
+        let stop = &mut Stop(pulse);
+        let report = solver.solve(&mut operator, &mut preconditioner, &side, &mut step, &CG, stop);
+        let promised = self.promised(&step, &side, &diagonal);
+        Solution { step, promised, report }
+    }
+
+    /// `|r|² − |r + J x|² = xᵀb + xᵀD x` for the `x` that conjugate gradients give, by mold.
+    fn promised(&self, x: &[f64], side: &[f64], diagonal: &[f64]) -> Vec<f64> {
+        let gain = |x: &[f64], b: &[f64], d: &[f64]| -> f64 {
+            x.iter().zip(b).zip(d).map(|((x, b), d)| x * b + d * x * x).sum()
+        };
+        let panels = self.blocks.len();
+        let (poses, molds) = parts(x, panels);
+        let (pose_sides, mold_sides) = parts(side, panels);
+        let (pose_diagonals, mold_diagonals) = parts(diagonal, panels);
+        let mut promised: Vec<f64> =
+            (0..self.molds).map(|m| gain(&molds[m], &mold_sides[m], &mold_diagonals[m])).collect();
+        for (p, &label) in self.labels.iter().enumerate() {
+            promised[label] += gain(&poses[p], &pose_sides[p], &pose_diagonals[p]);
         }
-        let side = r.clone();
-        let mut x = Unknowns::zero(self.blocks.len(), fit.molds.len());
-        let mut z = x.clone();
-        let mut product = x.clone();
-        preconditioner.apply(fit, &r, &mut z);
-        let mut direction = z.clone();
-        let mut rz = r.dot(&z);
-        let goal = CG_TOLERANCE * CG_TOLERANCE * rz;
-        let mut iterations = 0;
-        while iterations < CG_STEPS && rz > goal {
-            iterations += 1;
-            self.apply(fit, &direction, &mut product);
-            product.add_scaled_by(&preconditioner.diagonal, &direction);
-            let curvature = direction.dot(&product);
-            if !(curvature > 0.0) {
-                break;
-            }
-            let alpha = rz / curvature;
-            x.add(alpha, &direction);
-            r.add(-alpha, &product);
-            preconditioner.apply(fit, &r, &mut z);
-            let next = r.dot(&z);
-            direction.scale_and_add(next / rz, &z);
-            rz = next;
+        promised
+    }
+}
+
+/// The normal matrix with damping.
+struct Damped<'s> {
+    system: &'s System<'s>,
+    diagonal: &'s [f64],
+    /// Scratch space: what every panel adds to its mold.
+    shares: Vec<[f64; MAX_PARAMETERS]>,
+}
+
+impl LinearOperator for Damped<'_> {
+    fn apply(&mut self, x: &[f64], out: &mut [f64]) {
+        let (system, panels) = (self.system, self.system.blocks.len());
+        let (poses, molds) = parts(x, panels);
+        let values = |p: usize| {
+            let mut values = [0.0; SIDE];
+            values[..POSE].copy_from_slice(&poses[p]);
+            values[POSE..].copy_from_slice(&molds[system.labels[p]]);
+            values
+        };
+        let (out_poses, out_molds) = parts_mut(out, panels);
+        out_poses.par_iter_mut().zip(&mut self.shares).with_min_len(64).enumerate().for_each(
+            |(p, (pose, mold))| {
+                let sum = pulp::Arch::new().dispatch(|| system.product_of(p, values));
+                pose.copy_from_slice(&sum[..POSE]);
+                mold.copy_from_slice(&sum[POSE..]);
+            },
+        );
+        // In the order of the panels: the same for every number of threads.
+        out_molds.iter_mut().for_each(|m| *m = [0.0; MAX_PARAMETERS]);
+        for (share, &label) in self.shares.iter().zip(system.labels) {
+            out_molds[label].iter_mut().zip(share).for_each(|(o, v)| *o += v);
         }
-        let promised = preconditioner.promised(fit, &x, &side);
-        Solution { step: x, promised, iterations }
+        out.iter_mut().zip(self.diagonal).zip(x).for_each(|((o, d), x)| *o += d * x);
+    }
+
+    fn dot(&self, a: &[f64], b: &[f64]) -> f64 {
+        dot(a, b, self.system.blocks.len())
     }
 }
 
 /// The preconditioner: each mold with the poses of its panels, without what couples panels with
 /// one another. Without the pose blocks a slide of all panels on a mold and the change of the mold
 /// that undoes it would be far from solved.
-struct Arrows {
-    /// Damping of every unknown.
-    diagonal: Unknowns,
+struct Arrows<'s> {
+    labels: &'s [usize],
     /// Factored pose blocks.
     poses: Vec<[[f64; POSE]; POSE]>,
     /// `pose block⁻¹ · cross`, a column per mold parameter.
@@ -253,19 +199,22 @@ struct Arrows {
     molds: Vec<[[f64; MAX_PARAMETERS]; MAX_PARAMETERS]>,
 }
 
-impl Arrows {
-    fn new(blocks: &[Matrix], fit: &Fit, damping: &[f64]) -> Self {
-        let mut diagonal = Unknowns::zero(blocks.len(), fit.molds.len());
-        let mut molds = vec![[[0.0; MAX_PARAMETERS]; MAX_PARAMETERS]; fit.molds.len()];
-        for (p, block) in blocks.iter().enumerate() {
-            let mold = &mut molds[fit.labels[p]];
+impl<'s> Arrows<'s> {
+    /// The preconditioner, and the damping of every unknown.
+    fn new(system: &'s System<'_>, damping: &[f64]) -> (Self, Vec<f64>) {
+        let (blocks, labels) = (&system.blocks, system.labels);
+        let mut diagonal = vec![0.0; system.unknowns()];
+        let (pose_diagonals, mold_diagonals) = parts_mut(&mut diagonal, blocks.len());
+        let mut molds = vec![[[0.0; MAX_PARAMETERS]; MAX_PARAMETERS]; system.molds];
+        for (block, &label) in blocks.iter().zip(labels) {
+            let mold = &mut molds[label];
             for i in 0..MAX_PARAMETERS {
                 for j in 0..=i {
                     mold[i][j] += block[POSE + i][POSE + j];
                 }
             }
         }
-        for ((d, block), &damping) in diagonal.molds.iter_mut().zip(&mut molds).zip(damping) {
+        for ((d, block), &damping) in mold_diagonals.iter_mut().zip(&mut molds).zip(damping) {
             damp(block, d, damping);
         }
         let mut poses = vec![[[0.0; POSE]; POSE]; blocks.len()];
@@ -273,9 +222,9 @@ impl Arrows {
         poses
             .par_iter_mut()
             .zip(&mut through)
-            .zip(&mut diagonal.poses)
+            .zip(pose_diagonals)
             .zip(blocks)
-            .zip(&fit.labels)
+            .zip(labels)
             .with_min_len(64)
             .for_each(|((((pose, through), d), block), &label)| {
                 for i in 0..POSE {
@@ -288,8 +237,8 @@ impl Arrows {
                     solve_semidefinite(pose, column);
                 }
             });
-        for (p, block) in blocks.iter().enumerate() {
-            let mold = &mut molds[fit.labels[p]];
+        for (p, (block, &label)) in blocks.iter().zip(labels).enumerate() {
+            let mold = &mut molds[label];
             for i in 0..MAX_PARAMETERS {
                 for j in 0..=i {
                     let cross = &block[POSE + i][..POSE];
@@ -298,38 +247,29 @@ impl Arrows {
             }
         }
         molds.iter_mut().for_each(|mold| factor_semidefinite(mold, PIVOT_RATIO));
-        Self { diagonal, poses, through, molds }
+        (Self { labels, poses, through, molds }, diagonal)
     }
+}
 
-    /// `|r|² − |r + J x|² = xᵀb + xᵀD x` for the `x` that conjugate gradients give, by mold.
-    fn promised(&self, fit: &Fit, x: &Unknowns, side: &Unknowns) -> Vec<f64> {
-        let gain = |x: &[f64], b: &[f64], d: &[f64]| -> f64 {
-            x.iter().zip(b).zip(d).map(|((x, b), d)| x * b + d * x * x).sum()
-        };
-        let mut promised: Vec<f64> = (0..x.molds.len())
-            .map(|m| gain(&x.molds[m], &side.molds[m], &self.diagonal.molds[m]))
-            .collect();
-        for (p, &label) in fit.labels.iter().enumerate() {
-            promised[label] += gain(&x.poses[p], &side.poses[p], &self.diagonal.poses[p]);
-        }
-        promised
-    }
-
-    fn apply(&self, fit: &Fit, r: &Unknowns, z: &mut Unknowns) {
-        z.molds.clone_from(&r.molds);
-        for ((through, r), &label) in self.through.iter().zip(&r.poses).zip(&fit.labels) {
-            for (z, column) in z.molds[label].iter_mut().zip(through) {
+impl Preconditioner for Arrows<'_> {
+    fn precondition(&mut self, residual: &[f64], out: &mut [f64]) {
+        let panels = self.poses.len();
+        let (poses, molds) = parts(residual, panels);
+        let (out_poses, out_molds) = parts_mut(out, panels);
+        out_molds.copy_from_slice(molds);
+        for ((through, r), &label) in self.through.iter().zip(poses).zip(self.labels) {
+            for (z, column) in out_molds[label].iter_mut().zip(through) {
                 *z -= column.iter().zip(r).map(|(a, b)| a * b).sum::<f64>();
             }
         }
-        z.molds.iter_mut().zip(&self.molds).for_each(|(z, l)| solve_semidefinite(l, z));
-        let molds = &z.molds;
-        z.poses
+        out_molds.iter_mut().zip(&self.molds).for_each(|(z, l)| solve_semidefinite(l, z));
+        let molds = &*out_molds;
+        out_poses
             .par_iter_mut()
-            .zip(&r.poses)
+            .zip(poses)
             .zip(&self.poses)
             .zip(&self.through)
-            .zip(&fit.labels)
+            .zip(self.labels)
             .with_min_len(64)
             .for_each(|((((z, r), pose), through), &label)| {
                 *z = *r;

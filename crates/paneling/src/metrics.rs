@@ -1,0 +1,76 @@
+//! The numbers a paneling is judged by.
+
+use crate::layout::panels::PanelSet;
+use crate::paneling::Paneling;
+use serde::Serialize;
+
+/// How well the panels of one paneling meet, in degrees, units of the model, and percent of the
+/// diagonal of the bounding box of all panels.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Quality {
+    /// Number of panels.
+    pub panels: usize,
+    /// Number of molds.
+    pub molds: usize,
+    /// Half of the kinks are at most this.
+    pub kink_median_deg: f64,
+    /// 95 % of the kinks are at most this.
+    pub kink_p95_deg: f64,
+    /// The largest kink.
+    pub kink_max_deg: f64,
+    /// Half of the gaps are at most this.
+    pub gap_median: f64,
+    /// 95 % of the gaps are at most this.
+    pub gap_p95: f64,
+    /// The largest gap.
+    pub gap_max: f64,
+    /// [`gap_median`](Self::gap_median) in percent.
+    pub gap_median_percent: f64,
+    /// [`gap_p95`](Self::gap_p95) in percent.
+    pub gap_p95_percent: f64,
+    /// [`gap_max`](Self::gap_max) in percent.
+    pub gap_max_percent: f64,
+    /// The largest distance of any panel from the design, in percent.
+    pub deviation_max_percent: f64,
+}
+
+impl Quality {
+    /// The quality of a paneling of these panels.
+    #[must_use]
+    pub fn new(set: &PanelSet, paneling: &Paneling) -> Self {
+        let (kinks, gaps) = (paneling.measures.kinks, paneling.measures.gaps);
+        let percent = |length: f64| set.percent_of_diagonal(length);
+        Self {
+            panels: set.len(),
+            molds: paneling.molds.len(),
+            kink_median_deg: kinks.median.to_degrees(),
+            kink_p95_deg: kinks.p95.to_degrees(),
+            kink_max_deg: kinks.max.to_degrees(),
+            gap_median: gaps.median,
+            gap_p95: gaps.p95,
+            gap_max: gaps.max,
+            gap_median_percent: percent(gaps.median),
+            gap_p95_percent: percent(gaps.p95),
+            gap_max_percent: percent(gaps.max),
+            deviation_max_percent: percent(paneling.measures.max_deviation()),
+        }
+    }
+}
+
+/// The numbers of a solution.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Metrics {
+    /// How well the panels meet.
+    #[serde(flatten)]
+    pub quality: Quality,
+    /// Total cost of molds and panels.
+    pub cost: f64,
+    /// How many times the worst seam exceeds the bounds, at most 1 if all are within; none without
+    /// bounds.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub worst_excess: Option<f64>,
+    /// The published grid clustering with as many molds; none if it is not to be compared with, or
+    /// the panels were covered.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub grid: Option<Quality>,
+}

@@ -1,0 +1,134 @@
+//! What every attempt of a run works on.
+
+use crate::error::Error;
+use crate::fit::clustering::{self, Clusters, Feature};
+use crate::fit::state::Fit;
+use crate::layout::panels::PanelSet;
+use crate::mold::prices::PriceList;
+use crate::mold::shape::MoldType;
+use crate::options::{Clustering, MoldRule, Options};
+use crate::pulse::Pulse;
+use crate::seam::unknowns::{SeamOptions, Seams};
+use crate::search::bounds::Bounds;
+use gp_solver::Fingerprint;
+
+/// A seam step that lowers the energy by less than this share is the last.
+const SEAM_STALL: f64 = 3e-2;
+
+/// Panels, prices and settings of a run. Lengths are in units of the panel size.
+pub(crate) struct Site<'a> {
+    pub(crate) options: &'a Options,
+    pub(crate) prices: &'a PriceList,
+    pub(crate) rule: MoldRule,
+    /// The types of molds, from the simplest to the most general; at least one.
+    pub(crate) types: Vec<MoldType>,
+    /// The panels.
+    pub(crate) set: PanelSet,
+    /// Curvatures of the panels in units of the model: the published grid clusters by these.
+    curvatures: &'a [[f64; 2]],
+    pub(crate) seam: SeamOptions,
+    pub(crate) incident: Vec<Vec<(usize, usize)>>,
+    /// Lengths here per length of the model.
+    pub(crate) unit: f64,
+}
+
+impl<'a> Site<'a> {
+    pub(crate) fn new(
+        panels: &'a PanelSet,
+        prices: &'a PriceList,
+        options: &'a Options,
+    ) -> Result<Self, Error> {
+        options.check()?;
+        let (mut rule, types, unit) = (options.rule()?, options.types(), 1.0 / panels.size);
+        prices.check(&types)?;
+        if let MoldRule::Bounds(bounds) = &mut rule {
+            bounds.max_gap = bounds.max_gap.map(|g| g / panels.size);
+        }
+        if let MoldRule::Count(molds) = rule
+            && (molds == 0 || molds > panels.len())
+        {
+            return Err(Error::MoldCount { molds, panels: panels.len() });
+        }
+        let set = panels.scaled(unit);
+        let incident = set.incident_seams();
+        let seam = SeamOptions {
+            steps: options.seam_steps,
+            gap_weight: 1.0,
+            design_weight: 0.1,
+            stall: SEAM_STALL,
+        };
+        let curvatures = panels.curvatures();
+        Ok(Self { options, prices, rule, types, set, curvatures, seam, incident, unit })
+    }
+
+    /// The bounds, if these are the rule.
+    pub(crate) fn bounds(&self) -> Option<Bounds> {
+        match self.rule {
+            MoldRule::Bounds(bounds) => Some(bounds),
+            MoldRule::PerRoot(_) | MoldRule::Count(_) => None,
+        }
+    }
+
+    /// The most general type.
+    pub(crate) fn general(&self) -> MoldType {
+        self.types[self.types.len() - 1]
+    }
+
+    /// The seam step with these weights of the seams.
+    pub(crate) fn seams<'s>(&'s self, weights: &'s [f64]) -> Seams<'s> {
+        Seams { set: &self.set, options: &self.seam, weights, incident: &self.incident }
+    }
+
+    /// The shapes of all panels; `None` if asked to stop.
+    pub(crate) fn features(&self, pulse: &Pulse<'_>) -> Option<Vec<Feature>> {
+        clustering::features(&self.set, self.options.slope_weight, pulse)
+    }
+
+    /// Groups the panels; `None` if asked to stop.
+    pub(crate) fn cluster(
+        &self,
+        features: &[Feature],
+        clustering: Clustering,
+        molds: usize,
+        pulse: &Pulse<'_>,
+    ) -> Option<Clusters> {
+        match clustering {
+            Clustering::Own => clustering::shapes(features, molds, 20, pulse),
+            Clustering::Cover => clustering::cover(features, molds, pulse),
+            Clustering::Grid => {
+                clustering::grid(self.curvatures, molds, self.options.diagram_axis, pulse)
+            }
+        }
+    }
+
+    /// A first fit of these clusters with one type of molds; `None` if asked to stop.
+    pub(crate) fn first_fit(
+        &self,
+        clusters: &Clusters,
+        kind: MoldType,
+        pulse: &Pulse<'_>,
+    ) -> Option<Fit> {
+        let kinds = vec![kind; clusters.count];
+        Fit::new(&self.set, clusters, &kinds, self.options.slope_weight, pulse)
+    }
+
+    /// Total cost of molds and panels.
+    pub(crate) fn cost(&self, fit: &Fit) -> f64 {
+        fit.molds.iter().zip(&fit.members).map(|(m, p)| self.prices.cost(m.kind, p.len())).sum()
+    }
+
+    /// Of everything a run depends on.
+    pub(crate) fn fingerprint(&self) -> u64 {
+        let mut of = Fingerprint::new().numbers(&[self.unit]);
+        let samples = [&self.set.samples, &self.set.edges];
+        for point in samples.into_iter().flat_map(|s| s.points.iter().chain(&s.normals)) {
+            of = of.numbers(&point.to_array());
+        }
+        for seam in &self.set.seams {
+            of = of.counts(seam.panels.map(|p| p as u64));
+        }
+        // Sheets are cut when all is done.
+        let options = Options { sheet: None, ..self.options.clone() };
+        of.text(&format!("{options:?} {:?}", self.prices)).finish()
+    }
+}
