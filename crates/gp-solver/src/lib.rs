@@ -57,6 +57,7 @@ mod problem;
 mod qp;
 mod quadratic;
 mod report;
+mod rows;
 mod schedule;
 mod trust_region;
 mod variables;
@@ -76,13 +77,14 @@ pub use linear::{BandCholesky, SymmetricPattern};
 #[cfg(feature = "sparse")]
 pub use linear::{MultifrontalCholesky, SparseCholesky};
 #[cfg(feature = "sparse")]
-pub use min_norm::{MinNormProjection, ProjectionOptions, ProjectionReport};
+pub use min_norm::{MinNormProjection, ProjectionOptions};
 pub use observer::{Observer, Progress};
 pub use options::{Factorization, Method, Options, Regularization};
 pub use problem::{BlockId, Problem};
 pub use qp::{DenseQp, QpSolution};
 pub use quadratic::{Equation, QuadraticBuilder, QuadraticConstraints};
 pub use report::{IterationRecord, Report, Status, Term, Timings};
+pub use rows::Rows;
 pub use schedule::{Extra, RunReport, Stage, StageReport};
 pub use trust_region::{Accepted, Attempt, DampedModel, DampingPolicy, Verdict, damped_step};
 pub use variables::{Group, Variables};

@@ -10,7 +10,9 @@
 use std::collections::HashMap;
 
 use geom_core::{DVec2, DVec3};
-use gp_solver::{Closeness, MinNormProjection, Options, Problem, ProjectionOptions, Status, solve};
+use gp_solver::{
+    Closeness, MinNormProjection, Options, Problem, ProjectionOptions, Stage, Status, solve,
+};
 
 use crate::boundary::normals::blocks::{Exactness, Fairness};
 use crate::boundary::normals::curve::{COLUMNS, CURVE_DEGREE, CurveEnd, LINE, NormalCurve, OWN};
@@ -331,7 +333,10 @@ impl<'a> NormalNet<'a> {
             MinNormProjection::new(&exact, x.len(), 3).map_err(AsymptoticError::Curves)?;
         let options =
             ProjectionOptions { tolerance: 1e-3 * CLOSED, ..ProjectionOptions::default() };
-        projection.project(&exact, &mut x, &scale, &options).map_err(AsymptoticError::Curves)?;
+        let stage = Stage::only("curves");
+        projection
+            .project(&exact, &mut x, &scale, &options, &stage, &mut ())
+            .map_err(AsymptoticError::Curves)?;
         self.x = x;
         Ok(())
     }
