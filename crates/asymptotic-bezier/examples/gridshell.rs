@@ -38,7 +38,7 @@ fn net() -> Result<PolyMesh, Box<dyn Error>> {
 fn obj(solution: &Solution) -> Result<String, std::fmt::Error> {
     let mut text = String::new();
     let mut first = 1;
-    let mut vertex = |text: &mut String, p: DVec3| writeln!(text, "v {} {} {}", p.x, p.y, p.z);
+    let vertex = |text: &mut String, p: DVec3| writeln!(text, "v {} {} {}", p.x, p.y, p.z);
     let t = |k: usize| k as f64 / SEGMENTS as f64;
     let side = SEGMENTS + 1;
     for (f, filled) in solution.result.patches.iter().enumerate() {

@@ -5,7 +5,8 @@ use crate::net_files::PICTURE_CELLS;
 use crate::report_support;
 use exchange::LengthUnit;
 use geom_core::DVec3;
-use hyperbolic_nets::{HyperbolicNet, NetReport, PatchJet, SampledPatches};
+use gp_solver::RunReport;
+use hyperbolic_nets::{HyperbolicNet, POLISH, PatchJet, SampledPatches};
 use report::{
     EnergyHistory, Histogram, LineRole, LineSet, Report, ScalarField, Seam, SeamTable, Series,
     SurfaceView,
@@ -112,24 +113,26 @@ fn worst_seams(stage: &str, surface: &HyperbolicNet, kinks: &[f64]) -> SeamTable
     }
 }
 
-/// Energies of all steps.
-pub(crate) fn add_energies(page: &mut Report, report: &NetReport) {
+/// Energies of the terms before every step; polishing has equations and no terms.
+pub(crate) fn add_energies(page: &mut Report, report: &RunReport) {
     let mut history = EnergyHistory::default();
-    let mut stage = None;
-    for (k, step) in report.history.iter().enumerate() {
-        if stage.replace(step.stage) != Some(step.stage) {
-            history.marks.push((k, format!("stage {}", step.stage + 1)));
-        }
-        for term in &step.terms {
-            match history.terms.iter_mut().find(|s| s.name == term.name) {
-                Some(series) => series.values.push(term.energy),
-                None => {
-                    // A term that joins later has no value before.
-                    let mut values = vec![f64::NAN; k];
-                    values.push(term.energy);
-                    history.terms.push(Series { name: term.name.clone(), values });
+    let mut steps = 0;
+    for stage in report.stages.iter().filter(|s| s.stage.name != POLISH) {
+        history.marks.push((steps, stage.stage.name.clone()));
+        // A Gauss-Newton step's record has the terms it began with.
+        for record in stage.solver.history.iter().skip(1) {
+            for (term, &energy) in stage.solver.terms.iter().zip(&record.terms) {
+                match history.terms.iter_mut().find(|s| s.name == term.name) {
+                    Some(series) => series.values.push(energy),
+                    None => {
+                        // A term that joins later has no value before.
+                        let mut values = vec![f64::NAN; steps];
+                        values.push(energy);
+                        history.terms.push(Series { name: term.name.clone(), values });
+                    }
                 }
             }
+            steps += 1;
         }
     }
     if !history.terms.is_empty() {

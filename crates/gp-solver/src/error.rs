@@ -26,6 +26,9 @@ pub enum SolverError {
          it with as many rows as columns"
     )]
     NotSquare { block: String, element: usize, rows: usize, columns: usize },
+    /// An energy where rows are wanted.
+    #[error("block `{block}` is an energy without rows; equations are made of residual blocks")]
+    NoRows { block: String },
     /// NaN or infinity from a block.
     #[error(
         "{quantity} of row {row} of block `{block}` is {value} at the current iterate; \

@@ -156,6 +156,11 @@ pub trait ListItem: OptionValue {
     const LIST_FORM: &'static str;
 }
 
+impl ListItem for f64 {
+    const BETWEEN: char = ',';
+    const LIST_FORM: &'static str = "X,...";
+}
+
 /// Several values: one word with the values between separators, a flag that may be repeated, and
 /// in configuration files such a word or a list of words.
 #[derive(Clone, Debug, PartialEq)]

@@ -74,6 +74,7 @@ mod qp;
 mod quadratic;
 mod report;
 mod rounds;
+mod rows;
 mod schedule;
 mod trust_region;
 mod variables;
@@ -97,7 +98,7 @@ pub use linear::{
 #[cfg(feature = "sparse")]
 pub use linear::{MultifrontalCholesky, SparseCholesky};
 #[cfg(feature = "sparse")]
-pub use min_norm::{MinNormProjection, ProjectionOptions, ProjectionReport};
+pub use min_norm::{MinNormProjection, ProjectionOptions};
 pub use observer::{Observer, Progress};
 pub use options::{Factorization, Method, Options, Regularization};
 pub use problem::{BlockId, Problem};
@@ -107,6 +108,7 @@ pub use qp::{DenseQp, LinearEquation, QpSolution, QuadraticForm, QuadraticTerm};
 pub use quadratic::{Equation, QuadraticBuilder, QuadraticConstraints};
 pub use report::{IterationRecord, Report, Status, Term, Timings};
 pub use rounds::{Renewed, RoundOptions, Rounds};
+pub use rows::Rows;
 pub use schedule::{Extra, RunReport, Stage, StageReport};
 pub use trust_region::{Accepted, Attempt, DampedModel, DampingPolicy, Verdict, damped_step};
 pub use variables::{Group, Variables};

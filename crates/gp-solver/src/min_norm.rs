@@ -1,9 +1,12 @@
 //! Shortest steps onto constraints.
 
 use crate::block::ResidualBlock;
+use crate::clock::Instant;
 use crate::error::{Quantity, SolverError};
 use crate::linear::{MultifrontalCholesky, SymmetricPattern};
-use crate::report::Status;
+use crate::observer::{Observer, Progress};
+use crate::report::{IterationRecord, Report, Status, Term, Timings};
+use crate::schedule::Stage;
 
 /// A factorisation serves for another step if the last one left at most this share of `max |C|`.
 const KEEP: f64 = 0.1;
@@ -32,19 +35,6 @@ impl Default for ProjectionOptions {
     }
 }
 
-/// What a projection did.
-#[derive(Clone, Debug, PartialEq)]
-pub struct ProjectionReport {
-    /// How it ended; [`Stalled`](Status::Stalled) if the constraints stopped shrinking.
-    pub status: Status,
-    /// Steps taken.
-    pub iterations: usize,
-    /// `max |C|` at the start.
-    pub initial_violation: f64,
-    /// `max |C|` of the result.
-    pub final_violation: f64,
-}
-
 /// Newton's method for `C(z) = 0` with steps of least `|S⁻¹ s|`:
 /// `z ← z − S Sᵀ Jᵀ (J S Sᵀ Jᵀ + shift I)⁻¹ C`, with the pattern of the matrix analysed once and
 /// its factorisation kept (with its `J`) as long as every step leaves at most a tenth of `max |C|`.
@@ -59,6 +49,8 @@ pub struct MinNormProjection {
     starts: Vec<usize>,
     /// Where the products of the pairs of each unknown's entries go.
     targets: Vec<usize>,
+    /// Time the plan took.
+    plan: std::time::Duration,
 }
 
 impl MinNormProjection {
@@ -76,6 +68,7 @@ impl MinNormProjection {
         unknowns: usize,
         run: usize,
     ) -> Result<Self, SolverError> {
+        let begin = Instant::now();
         let elements = constraints.elements();
         let mut lists = vec![Vec::new(); unknowns];
         for e in 0..elements.len() {
@@ -105,10 +98,17 @@ impl MinNormProjection {
         }
         let together: Vec<usize> = (0..pattern.size()).map(|row| row / run).collect();
         let cholesky = MultifrontalCholesky::new(pattern, &together)?;
-        Ok(Self { unknowns, cholesky, entries: lists.concat(), starts, targets })
+        let (entries, plan) = (lists.concat(), begin.elapsed());
+        Ok(Self { unknowns, cholesky, entries, starts, targets, plan })
     }
 
-    /// Projects `z`; `scale[i]` is how willingly unknown `i` moves (0 holds it).
+    /// Projects `z`; `scale[i]` is how willingly unknown `i` moves (0 holds it). `observer` is asked
+    /// between factorisations whether to stop and shown the start and every step; there is no
+    /// checkpoint within a projection, which is repeated from its start.
+    ///
+    /// The report's energy is `½ |C|²`; its gradient norms are `max |C|`: the first record has that
+    /// of the start, [`Report::gradient_norm`] that of the result. The status is
+    /// [`Stalled`](Status::Stalled) if the constraints stopped shrinking.
     ///
     /// # Errors
     /// [`SolverError::NotFinite`] names a row, [`SolverError::NotPositiveDefinite`] the constraint
@@ -122,8 +122,12 @@ impl MinNormProjection {
         z: &mut [f64],
         scale: &[f64],
         options: &ProjectionOptions,
-    ) -> Result<ProjectionReport, SolverError> {
+        stage: &Stage,
+        observer: &mut dyn Observer,
+    ) -> Result<Report, SolverError> {
         assert!(z.len() == self.unknowns && scale.len() == self.unknowns, "one value per unknown");
+        let begin = Instant::now();
+        let mut timings = Timings { plan: self.plan, ..Timings::default() };
         let elements = constraints.elements();
         let mut residuals = vec![0.0; elements.rows_total()];
         let mut next_residuals = residuals.clone();
@@ -132,25 +136,53 @@ impl MinNormProjection {
         let mut trial = z.to_vec();
         constraints.linearize(z, &mut residuals, &mut jacobian);
         let mut violation = largest(constraints.name(), &residuals)?;
-        let initial_violation = violation;
-        let mut iterations = 0;
         let (mut shift, mut least_shift) = (options.shift, LEAST_SHIFT);
         // Whether there is a factorisation, and whether it was made at `z`.
         let (mut usable, mut fresh) = (false, false);
+        let (mut factorizations, mut evaluations, mut factorizations_before) = (0, 1, 0);
+        let mut history = vec![record(half_square(&residuals), violation)];
+        let mut shown = None;
         let status = loop {
+            let iterations = history.len() - 1;
+            if shown != Some(iterations) {
+                shown = Some(iterations);
+                let flow = observer.step(&Progress {
+                    stage,
+                    iteration: iterations,
+                    max_iterations: options.max_iterations,
+                    energy: history[iterations].energy,
+                    gradient_norm: violation,
+                    x: z,
+                    system: None,
+                });
+                if flow.is_break() {
+                    break Status::Interrupted;
+                }
+            }
             if violation <= options.tolerance {
                 break Status::Converged;
             }
             if iterations >= options.max_iterations {
                 break Status::IterationLimit;
             }
+            if observer.stop_requested() {
+                break Status::Interrupted;
+            }
             if !usable {
+                let linearizing = Instant::now();
                 if !fresh && iterations > 0 {
                     constraints.linearize(z, &mut residuals, &mut jacobian);
                 }
+                timings.linearize += linearizing.elapsed();
                 fresh = true;
+                let forming = Instant::now();
                 self.fill(&jacobian, scale, shift, &mut values);
-                match self.cholesky.factor(&values) {
+                timings.normal += forming.elapsed();
+                let factoring = Instant::now();
+                let factored = self.cholesky.factor(&values);
+                timings.factor += factoring.elapsed();
+                factorizations += 1;
+                match factored {
                     Ok(()) => {}
                     Err(SolverError::NotPositiveDefinite { .. }) if shift < options.shift => {
                         // Back to the last shift that was large enough.
@@ -161,6 +193,7 @@ impl MinNormProjection {
                     Err(error) => return Err(error),
                 }
             }
+            let solving = Instant::now();
             let mut multipliers = residuals.clone();
             self.cholesky.solve_in_place(&mut multipliers);
             for i in 0..self.unknowns {
@@ -168,23 +201,53 @@ impl MinNormProjection {
                 let sum: f64 = entries.iter().map(|&(r, k)| jacobian[k] * multipliers[r]).sum();
                 trial[i] = z[i] - scale[i] * scale[i] * sum;
             }
+            timings.solve += solving.elapsed();
+            let evaluating = Instant::now();
             constraints.residuals(&trial, &mut next_residuals);
+            timings.residuals += evaluating.elapsed();
+            evaluations += 1;
             let next = largest(constraints.name(), &next_residuals)?;
+            let used = shift;
             usable = next <= KEEP * violation;
             if fresh && next > SLOW * violation {
                 shift = least_shift.max(0.1 * shift).min(shift);
             }
             if next < violation {
+                let energy = half_square(&next_residuals);
+                let square: f64 = trial.iter().zip(&*z).map(|(a, b)| (a - b).powi(2)).sum();
+                history.push(IterationRecord {
+                    decrease: history[iterations].energy - energy,
+                    damping: used,
+                    step_norm: square.sqrt(),
+                    factorizations: factorizations - factorizations_before,
+                    ..record(energy, violation)
+                });
+                factorizations_before = factorizations;
                 z.copy_from_slice(&trial);
                 std::mem::swap(&mut residuals, &mut next_residuals);
                 violation = next;
-                iterations += 1;
                 fresh = false;
             } else if fresh {
                 break Status::Stalled;
             }
         };
-        Ok(ProjectionReport { status, iterations, initial_violation, final_violation: violation })
+        timings.total = begin.elapsed();
+        let final_energy = history[history.len() - 1].energy;
+        Ok(Report {
+            status,
+            iterations: history.len() - 1,
+            initial_energy: history[0].energy,
+            final_energy,
+            terms: vec![Term { name: constraints.name().to_owned(), energy: final_energy }],
+            history,
+            factorizations,
+            evaluations,
+            gradient_norm: violation,
+            damping: shift,
+            variables: scale.iter().filter(|s| **s != 0.0).count(),
+            rows: elements.rows_total(),
+            timings,
+        })
     }
 
     /// `J S Sᵀ Jᵀ + shift · max diagonal`.
@@ -207,6 +270,23 @@ impl MinNormProjection {
             values[d] += shift;
         }
     }
+}
+
+/// A record of no step yet; `violation` is `max |C|` where it began.
+fn record(energy: f64, violation: f64) -> IterationRecord {
+    IterationRecord {
+        energy,
+        terms: vec![energy],
+        decrease: 0.0,
+        damping: 0.0,
+        step_norm: 0.0,
+        gradient_norm: violation,
+        factorizations: 0,
+    }
+}
+
+fn half_square(residuals: &[f64]) -> f64 {
+    0.5 * residuals.iter().map(|r| r * r).sum::<f64>()
 }
 
 fn largest(block: &str, residuals: &[f64]) -> Result<f64, SolverError> {
@@ -242,12 +322,44 @@ mod tests {
         let mut projection = MinNormProjection::new(&sphere, 3, 1).unwrap();
         let mut z = [1.02, 2.04, -2.04];
         let options = ProjectionOptions { tolerance: 1e-14, ..ProjectionOptions::default() };
-        let report = projection.project(&sphere, &mut z, &[1.0; 3], &options).unwrap();
+        let stage = Stage::only("polish");
+        let mut steps = Vec::new();
+        let mut watch = |progress: &Progress<'_>| {
+            steps.push((progress.iteration, progress.gradient_norm));
+            std::ops::ControlFlow::Continue(())
+        };
+        let report =
+            projection.project(&sphere, &mut z, &[1.0; 3], &options, &stage, &mut watch).unwrap();
         assert_eq!(report.status, Status::Converged, "{report:?}");
+        assert_eq!(steps.len(), report.iterations + 1);
+        assert_eq!(steps[0], (0, report.history[0].gradient_norm));
+        assert_eq!(steps[report.iterations], (report.iterations, report.gradient_norm));
         assert!((z[1] - 2.0 * z[0]).abs() < 1e-12 && (z[2] + 2.0 * z[0]).abs() < 1e-12, "{z:?}");
         let mut held = [0.6, 0.7, 0.1];
-        let report = projection.project(&sphere, &mut held, &[0.0, 1.0, 0.0], &options).unwrap();
+        let scale = [0.0, 1.0, 0.0];
+        let report =
+            projection.project(&sphere, &mut held, &scale, &options, &stage, &mut ()).unwrap();
         assert_eq!(report.status, Status::Converged);
         assert!(held[0] == 0.6 && held[2] == 0.1 && (held[1] - 0.63_f64.sqrt()).abs() < 1e-12);
+    }
+
+    #[test]
+    fn a_projection_is_stopped_before_it_factors() {
+        struct Stop;
+        impl Observer for Stop {
+            fn stop_requested(&mut self) -> bool {
+                true
+            }
+        }
+        let mut rows = QuadraticBuilder::new("circle");
+        rows.equation(1.0).product(0, 0, 1.0).product(1, 1, 1.0).constant(-1.0);
+        let circle = rows.build();
+        let mut projection = MinNormProjection::new(&circle, 2, 1).unwrap();
+        let (mut z, options) = ([2.0, 0.0], ProjectionOptions::default());
+        let stage = Stage::only("polish");
+        let report =
+            projection.project(&circle, &mut z, &[1.0; 2], &options, &stage, &mut Stop).unwrap();
+        assert_eq!((report.status, report.factorizations), (Status::Interrupted, 0));
+        assert_eq!((z, report.gradient_norm), ([2.0, 0.0], 3.0));
     }
 }

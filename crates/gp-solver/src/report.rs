@@ -107,7 +107,8 @@ pub struct Report {
     pub factorizations: usize,
     /// Evaluations of value and gradient, for methods without factorisations.
     pub evaluations: usize,
-    /// Scaled gradient norm at the last linearisation.
+    /// Scaled gradient norm at the last linearisation; `max |C|` of the result for projections onto
+    /// constraints.
     pub gradient_norm: f64,
     /// Damping after the last step, to go on from.
     pub damping: f64,

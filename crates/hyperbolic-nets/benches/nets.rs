@@ -4,8 +4,7 @@
 use criterion::{Criterion, criterion_group, criterion_main};
 use fixtures::asymptotic_nets::{self, AsymptoticNet};
 use geom_core::PolyMesh;
-use hyperbolic_nets::{JointOptions, PublishedOptions, QuadNet, solve_joint, solve_published};
-use std::ops::ControlFlow;
+use hyperbolic_nets::{Input, Options, QuadNet, solve};
 use std::time::{Duration, Instant};
 
 fn quad_net(model: &AsymptoticNet) -> QuadNet {
@@ -14,10 +13,8 @@ fn quad_net(model: &AsymptoticNet) -> QuadNet {
 }
 
 fn joint(model: &AsymptoticNet, net: &QuadNet) -> f64 {
-    let go_on = |_: &_| ControlFlow::Continue(());
-    let (surface, _) =
-        solve_joint(net, &*model.surface, &JointOptions::default(), go_on).expect("solved");
-    surface.kink_statistics().max
+    let input = Input::near_surface(net, &*model.surface);
+    solve(&input, &Options::default(), &mut ()).expect("solved").metrics.kink_max_deg
 }
 
 fn nets(c: &mut Criterion) {
@@ -36,11 +33,9 @@ fn nets(c: &mut Criterion) {
             let mut total = Duration::ZERO;
             for _ in 0..repeats {
                 let start = Instant::now();
-                let go_on = |_: &_| ControlFlow::Continue(());
-                let options = PublishedOptions::default();
-                let (_, report) =
-                    solve_published(&net, &*disc.surface, &options, go_on).expect("solved");
-                total += start.elapsed() / report.iterations.max(1) as u32;
+                let input = Input::near_surface(&net, &*disc.surface);
+                let solution = solve(&input, &Options::published(), &mut ()).expect("solved");
+                total += start.elapsed() / solution.report.iterations.max(1) as u32;
             }
             total
         });
@@ -52,7 +47,7 @@ fn nets(c: &mut Criterion) {
         let disc = asymptotic_nets::scherk(100).jittered(0.05, 1);
         let net = quad_net(&disc);
         let start = Instant::now();
-        let kink = joint(&disc, &net).to_degrees();
+        let kink = joint(&disc, &net);
         let (faces, seconds) = (net.quads().len(), start.elapsed().as_secs_f64());
         eprintln!(
             "hyperbolic_nets/joint/{faces}: {seconds:.2} s, once; kinks max {kink:.1e} degrees"

@@ -1,5 +1,7 @@
 //! What this crate refuses to work on.
 
+use gp_solver::SolverError;
+
 /// Why a rational bilinear patch was refused.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
@@ -20,11 +22,12 @@ pub enum PatchError {
     Singular { u: f64, v: f64 },
 }
 
-/// Why a mesh is not a net this crate can work on.
+/// Why a mesh is not a net this crate can work on, or a solve cannot be attempted. Not converging is
+/// a status, not an error.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 #[expect(missing_docs, reason = "the messages spell out every field")]
-pub enum NetError {
+pub enum Error {
     /// A face that is not a quad.
     #[error(
         "face {face} has {corners} corners; a net needs quads along the asymptotic directions: remesh the surface to such quads first"
@@ -71,9 +74,20 @@ pub enum NetError {
     /// A shape parameter that is zero, negative, infinite or NaN.
     #[error("face {face} has shape parameter {value}; shape parameters are positive")]
     BadShapeParameter { face: usize, value: f64 },
+    /// A setting that makes no sense.
+    #[error("`{name}` is {value}; it must be {need}")]
+    BadOption { name: &'static str, value: f64, need: &'static str },
+    /// A weight that the method asked for does not have.
+    #[error(
+        "`{name}` is a weight of the {method} method; leave it out or set `method` to {method}"
+    )]
+    OtherMethod { name: &'static str, method: &'static str },
     /// A linear system that has no solution.
     #[error(
-        "the linear system of {what} could not be solved ({message}); look for faces that touch nothing else, and clean the mesh"
+        "the linear system of {what} could not be solved ({source}); look for faces that touch nothing else, and clean the mesh"
     )]
-    Linear { what: &'static str, message: String },
+    Linear { what: &'static str, source: SolverError },
+    /// From the solver.
+    #[error(transparent)]
+    Solver(#[from] SolverError),
 }

@@ -1,7 +1,7 @@
 //! What to know about an input net before it is solved.
 
-use crate::lelieuvre::signs;
-use crate::{AsymptoticField, BoundaryPolygon, NetError, QuadNet};
+use crate::net::signs;
+use crate::{AsymptoticField, Error, QuadNet, Warning};
 
 /// Share of negatively curved area below which a net is refused, and below which it is warned of.
 const NEGATIVE_SHARE: [f64; 2] = [0.60, 0.95];
@@ -31,70 +31,10 @@ pub struct GateReport {
     pub two_colourable: bool,
 }
 
-/// What is unusual about an input without making it unusable.
-#[derive(Clone, Debug, PartialEq, thiserror::Error)]
-#[non_exhaustive]
-#[expect(missing_docs, reason = "the messages spell out every field")]
-pub enum NetWarning {
-    /// Some of the surface is not negatively curved.
-    #[error(
-        "{percent:.0} % of the surface is not negatively curved; the net will leave the surface there, trim it away if that is too far"
-    )]
-    NotEverywhereNegative { percent: f64 },
-    /// Edges stray from the asymptotic directions.
-    #[error(
-        "edges run {mean_deg:.1} degrees off the asymptotic directions in the mean; remesh along these if the result moves too far"
-    )]
-    Misaligned { mean_deg: f64 },
-    /// Some edges twist the wrong way.
-    #[error(
-        "{wrong} of {edges} edges twist against their family; look for folded or very flat faces and remesh there"
-    )]
-    WrongTwists { wrong: usize, edges: usize },
-    /// The net folds back.
-    #[error(
-        "the input folds back at {edges} edges; untangle or remesh these faces if the result does so too"
-    )]
-    Folds { edges: usize },
-    /// Faces without twist.
-    #[error(
-        "{count} faces are planar (first: {first}); the surface is flat there and the net may lose its shape: use larger faces there"
-    )]
-    PlanarFaces { count: usize, first: usize },
-    /// A boundary polygon that an exact net near the input cannot have.
-    #[error(
-        "the boundary moves by up to {moved:.1e} edge lengths so that the net can be exact: its polygon prescribes the tangent planes along it ({angle_deg:.1} degrees off the faces in the mean) and around a loop an alternating product that is off from 1 by {excess:.1e}; move its vertices onto a smoother curve, or let them slide along it (boundary glide)"
-    )]
-    BoundaryPrescribed { angle_deg: f64, excess: f64, moved: f64 },
-    /// No alternating colouring.
-    #[error(
-        "vertices cannot be coloured alternately around some hole (an odd number of edges leads around it): the shape parameters are unique and no common factor can be chosen"
-    )]
-    NotTwoColourable,
-}
-
-impl NetWarning {
-    /// Why a fixed boundary moved by `moved` edge lengths.
-    #[must_use]
-    pub fn boundary(net: &QuadNet, moved: f64) -> Self {
-        let BoundaryPolygon { closing, plane_angle } = BoundaryPolygon::new(net);
-        let (angle_deg, excess) = (plane_angle.to_degrees(), closing.exp_m1());
-        Self::BoundaryPrescribed { angle_deg, excess, moved }
-    }
-}
-
 /// Measures a net; `field` belongs to its reference surface.
 #[must_use]
 pub fn inspect(net: &QuadNet, field: &AsymptoticField<'_>) -> GateReport {
     let positions = net.positions();
-    let angles: Vec<f64> = net
-        .edges()
-        .iter()
-        .filter_map(|e| {
-            let [a, b] = e.ends.map(|v| positions[v]);
-            field.misalignment((a + b) / 2.0, b - a)
-        })
-        .collect();
     let normals = net.vertex_normals(positions);
     let (_, wrong_twists) = signs(net, positions, &normals);
     let planar = |q: &[u32; 4]| {
@@ -106,7 +46,7 @@ pub fn inspect(net: &QuadNet, field: &AsymptoticField<'_>) -> GateReport {
     };
     GateReport {
         negative_share: field.negative_share(),
-        misalignment: angles.iter().sum::<f64>() / angles.len().max(1) as f64,
+        misalignment: field.mean_misalignment(net),
         wrong_twists,
         edges: net.edges().len(),
         folds: net.inner_edges().iter().filter(|e| net.join(e, positions).is_folded()).count(),
@@ -119,42 +59,39 @@ impl GateReport {
     /// Warnings for what is unusual.
     ///
     /// # Errors
-    /// [`NetError::CurvatureAligned`], [`NetError::NotNegativelyCurved`] or
-    /// [`NetError::Misaligned`] for nets that no solver here can make smooth.
-    pub fn check(&self) -> Result<Vec<NetWarning>, NetError> {
+    /// [`Error::CurvatureAligned`], [`Error::NotNegativelyCurved`] or
+    /// [`Error::Misaligned`] for nets that no solver here can make smooth.
+    pub fn check(&self) -> Result<Vec<Warning>, Error> {
         let (wrong, edges) = (self.wrong_twists, self.edges);
         let percent = 100.0 * self.negative_share;
         if self.negative_share < NEGATIVE_SHARE[0] {
-            return Err(NetError::NotNegativelyCurved {
-                percent,
-                needed: 100.0 * NEGATIVE_SHARE[0],
-            });
+            return Err(Error::NotNegativelyCurved { percent, needed: 100.0 * NEGATIVE_SHARE[0] });
         }
         if wrong as f64 > WRONG_TWISTS * edges as f64 {
-            return Err(NetError::CurvatureAligned { wrong, edges });
+            return Err(Error::CurvatureAligned { wrong, edges });
         }
         let mean_deg = self.misalignment.to_degrees();
         if mean_deg > MISALIGNMENT_DEG[0] {
-            return Err(NetError::Misaligned { mean_deg, limit_deg: MISALIGNMENT_DEG[0] });
+            return Err(Error::Misaligned { mean_deg, limit_deg: MISALIGNMENT_DEG[0] });
         }
         let mut warnings = Vec::new();
         if self.negative_share < NEGATIVE_SHARE[1] {
-            warnings.push(NetWarning::NotEverywhereNegative { percent: 100.0 - percent });
+            warnings.push(Warning::NotEverywhereNegative { percent: 100.0 - percent });
         }
         if mean_deg > MISALIGNMENT_DEG[1] {
-            warnings.push(NetWarning::Misaligned { mean_deg });
+            warnings.push(Warning::Misaligned { mean_deg });
         }
         if wrong > 0 {
-            warnings.push(NetWarning::WrongTwists { wrong, edges });
+            warnings.push(Warning::WrongTwists { wrong, edges });
         }
         if self.folds > 0 {
-            warnings.push(NetWarning::Folds { edges: self.folds });
+            warnings.push(Warning::Folds { edges: self.folds });
         }
         if let Some(&first) = self.planar_faces.first() {
-            warnings.push(NetWarning::PlanarFaces { count: self.planar_faces.len(), first });
+            warnings.push(Warning::PlanarFaces { count: self.planar_faces.len(), first });
         }
         if !self.two_colourable {
-            warnings.push(NetWarning::NotTwoColourable);
+            warnings.push(Warning::NotTwoColourable);
         }
         Ok(warnings)
     }
@@ -163,6 +100,7 @@ impl GateReport {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::BoundaryPolygon;
     use fixtures::asymptotic_nets;
     use geom_core::{DVec3, PolyMesh, TriMesh};
 
@@ -194,7 +132,7 @@ mod tests {
         assert_eq!(report.check().unwrap(), vec![]);
         let odd = asymptotic_nets::catenoid_odd();
         let warnings = gates(odd.positions, &odd.quads).check().unwrap();
-        assert_eq!(warnings, vec![NetWarning::NotTwoColourable]);
+        assert_eq!(warnings, vec![Warning::NotTwoColourable]);
     }
 
     #[test]
@@ -207,7 +145,7 @@ mod tests {
         assert!(exact.closing < 1e-9 && exact.plane_angle.to_degrees() < 4.0, "{exact:?}");
         let rough = BoundaryPolygon::new(&net(asymptotic_nets::enneper().jittered(0.05, 1)));
         assert!(rough.closing > 0.1 && rough.plane_angle > exact.plane_angle, "{rough:?}");
-        let text = NetWarning::boundary(&net(asymptotic_nets::enneper()), 0.01).to_string();
+        let text = Warning::boundary(&net(asymptotic_nets::enneper()), 0.01).to_string();
         assert!(text.contains("glide") && text.contains("1.0e-2 edge lengths"), "{text}");
     }
 
@@ -216,7 +154,7 @@ mod tests {
         let saddle = |x: f64, y: f64| DVec3::new(x, y, 0.4 * (x * x - y * y));
         let (positions, quads) = grid(10, saddle);
         let report = gates(positions, &quads);
-        assert!(matches!(report.check(), Err(NetError::CurvatureAligned { .. })), "{report:?}");
+        assert!(matches!(report.check(), Err(Error::CurvatureAligned { .. })), "{report:?}");
         assert!(report.misalignment.to_degrees() > 35.0);
         // Its diagonals are asymptotic.
         let turned = |s: f64, t: f64| saddle((s + t) / 2.0, (s - t) / 2.0);
@@ -228,7 +166,7 @@ mod tests {
     fn positively_curved_surfaces_are_refused_in_whole_and_warned_of_in_part() {
         let (positions, quads) = grid(10, |x, y| DVec3::new(x, y, -0.2 * (x * x + y * y)));
         let error = gates(positions, &quads).check().unwrap_err();
-        assert!(matches!(error, NetError::NotNegativelyCurved { .. }), "{error}");
+        assert!(matches!(error, Error::NotNegativelyCurved { .. }), "{error}");
         assert!(error.to_string().contains("trim"));
         // A saddle with a dent.
         let dent = |x: f64, y: f64| {
@@ -239,7 +177,7 @@ mod tests {
         let report = gates(positions, &quads);
         let warnings = report.check().unwrap();
         assert!(
-            warnings.iter().any(|w| matches!(w, NetWarning::NotEverywhereNegative { .. })),
+            warnings.iter().any(|w| matches!(w, Warning::NotEverywhereNegative { .. })),
             "{report:?}"
         );
     }
@@ -255,9 +193,9 @@ mod tests {
         let report = gates(positions, &quads);
         assert!((report.misalignment.to_degrees() - 16.0).abs() < 1.0);
         let warnings = report.check().unwrap();
-        assert!(warnings.iter().any(|w| matches!(w, NetWarning::Misaligned { .. })));
+        assert!(warnings.iter().any(|w| matches!(w, Warning::Misaligned { .. })));
         let worse = GateReport { misalignment: 0.4, ..report };
-        assert!(matches!(worse.check(), Err(NetError::Misaligned { .. })));
+        assert!(matches!(worse.check(), Err(Error::Misaligned { .. })));
     }
 
     #[test]
@@ -270,7 +208,7 @@ mod tests {
         let report = gates(positions, &quads);
         assert!(report.folds > 0);
         let warnings = report.check().unwrap();
-        assert!(warnings.iter().any(|w| matches!(w, NetWarning::Folds { .. })));
-        assert!(warnings.iter().any(|w| matches!(w, NetWarning::PlanarFaces { first: 0, .. })));
+        assert!(warnings.iter().any(|w| matches!(w, Warning::Folds { .. })));
+        assert!(warnings.iter().any(|w| matches!(w, Warning::PlanarFaces { first: 0, .. })));
     }
 }

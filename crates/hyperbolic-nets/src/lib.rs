@@ -1,67 +1,51 @@
 //! Smooth skins of rational bilinear patches on asymptotic nets, and their Darboux transforms.
 //!
 //! A [`QuadNet`] sorts the edges of a quad mesh into two families; [`inspect`] says whether it
-//! follows the asymptotic directions of its surface. [`solve_joint`] then makes it an exact
-//! [`HyperbolicNet`] on any topology, [`solve_published`] is the method of Shi et al. 2014. A
-//! [`DarbouxMap`], given by a number `c` or by a cage ([`fit_cage`]), takes the net to a smooth
-//! surface of Darboux cyclide patches ([`TransformedNet`]).
+//! follows the asymptotic directions of its surface. [`solve`] makes it an exact [`HyperbolicNet`]
+//! on any topology, or follows the method of Shi et al. 2014 ([`Method::Published`]).
+//! [`solve_with`] takes further terms and equations, made of [`blocks`] or written by oneself. A
+//! [`darboux`] transformation, given by a number `c` or by a cage, takes the net to a smooth
+//! surface of Darboux cyclide patches.
 //!
 //! # Example
 //! ```
-//! use geom_core::{DVec3, PolyMesh, TriMesh};
-//! use hyperbolic_nets::{JointOptions, QuadNet, solve_joint};
-//! use std::ops::ControlFlow;
-//! // Sixteen quads near the rulings of z = xy.
-//! let at = |k: u32| f64::from(k) / 4.0 - 0.5;
-//! let points = (0..25).map(|k| (at(k / 5), at(k % 5)));
-//! let points = points.map(|(x, y)| DVec3::new(x, y, x * y + 0.01 * (9.0 * x).sin())).collect();
-//! let corner = |k: u32| [k, k + 5, k + 6, k + 1];
-//! let quads: Vec<[u32; 4]> = (0..19).filter(|k| k % 5 < 4).map(corner).collect();
-//! let mesh = PolyMesh::new(points, &quads)?;
-//! let (net, surface) = (QuadNet::new(&mesh)?, TriMesh::from_poly_mesh(&mesh));
-//! let go_on = |_: &_| ControlFlow::Continue(());
-//! let (skin, _) = solve_joint(&net, &surface, &JointOptions::default(), go_on)?;
-//! assert!(skin.kink_statistics().max < 1e-11); // radians
+//! use geom_core::PolyMesh;
+//! use hyperbolic_nets::{Input, Options, QuadNet, solve};
+//! let model = fixtures::asymptotic_nets::catenoid(20, 14).jittered(0.05, 1);
+//! let net = QuadNet::new(&PolyMesh::new(model.positions, &model.quads)?)?;
+//! let solution = solve(&Input::new(&net), &Options::default(), &mut ())?;
+//! println!("{}: kinks to {:.1e}°", solution.report.status, solution.metrics.kink_max_deg);
+//! assert!(solution.metrics.kink_max_deg < 1e-9);
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
-mod asymptotic_field;
-mod blocks;
-mod boundary;
-mod cage;
-mod darboux;
-mod descend;
+pub mod blocks;
+pub mod darboux;
 mod error;
-mod fabrication;
 mod gates;
-mod hyperbolic_net;
-mod join;
-mod joint;
-mod lelieuvre;
-mod measures;
+mod input;
+mod methods;
+mod metrics;
 mod net;
-mod patch;
-mod published;
-mod quad_distance;
-mod sample;
-mod shape;
-mod transformed;
+mod options;
+mod solve;
+mod vectors;
+mod warning;
 
-pub use asymptotic_field::AsymptoticField;
-pub use boundary::{Boundary, BoundaryPolygon};
-pub use cage::{CageFit, Freedom, cage_corners, fit_cage};
-pub use darboux::{Branch, Cyclide, DarbouxError, DarbouxMap, ImageCircle};
-pub use descend::StepRecord;
-pub use error::{NetError, PatchError};
-pub use fabrication::{WireCut, distinct_shape_parameters, wire_cuts};
-pub use gates::{GateReport, NetWarning, inspect};
-pub use hyperbolic_net::{HyperbolicNet, KINK_SAMPLES, KinkStatistics, distances, star_planarity};
-pub use join::EdgeJoin;
-pub use joint::{JointOptions, NetReport, solve_joint};
-pub use measures::{NetMeasures, not_negatively_curved};
-pub use net::{Family, InnerEdge, NetEdge, QuadNet};
-pub use patch::{BilinearPatch, PatchJet, Quadric};
-pub use published::{FairnessOrder, PublishedOptions, StarPlanarity, solve_published};
-pub use sample::{SampledPatches, SurfaceSample};
-pub use shape::{ShapeFit, Spread, best_log_factor, fit_shape_parameters};
-pub use transformed::{CAGE_EDGES, TransformedNet, cage_face_lines, image_of_segment};
+pub use error::{Error, PatchError};
+pub use gates::{GateReport, inspect};
+pub use gp_solver::Status;
+pub use input::Input;
+pub use methods::POLISH;
+pub use metrics::Metrics;
+pub use net::{
+    AsymptoticField, BilinearPatch, BoundaryPolygon, Combination, EdgeJoin, Family, HyperbolicNet,
+    InnerEdge, KINK_SAMPLES, KinkStatistics, LelieuvreStart, NetEdge, PatchJet, QuadNet, Quadric,
+    SampledPatches, ShapeFit, Spread, SurfaceSample, WireCut, best_log_factor, distances,
+    distinct_shape_parameters, fit_shape_parameters, second_differences, shape_parameters,
+    star_planarity, third_differences, wire_cuts,
+};
+pub use options::{Boundary, FairnessOrder, Method, Options, StarPlanarity};
+pub use solve::{Solution, problem, solve, solve_with};
+pub use vectors::{NORMALS, POSITIONS, variables};
+pub use warning::Warning;

@@ -2,13 +2,11 @@
 #![allow(clippy::unwrap_used, reason = "a test may panic")]
 
 use fixtures::asymptotic_nets::{self, AsymptoticNet};
-use geom_core::{PolyMesh, TriMesh};
+use geom_core::PolyMesh;
 use gp_solver::Status;
 use hyperbolic_nets::{
-    AsymptoticField, Boundary, BoundaryPolygon, JointOptions, QuadNet, distances,
-    not_negatively_curved, solve_joint, star_planarity,
+    Boundary, BoundaryPolygon, Input, Options, QuadNet, distances, solve, star_planarity,
 };
-use std::ops::ControlFlow;
 
 fn quad_net(model: &AsymptoticNet) -> QuadNet {
     QuadNet::new(&PolyMesh::new(model.positions.clone(), &model.quads).unwrap()).unwrap()
@@ -22,9 +20,9 @@ fn check(name: &str, model: AsymptoticNet) {
 fn check_near(name: &str, model: AsymptoticNet, mean_distance: f64, max_distance: f64) {
     let model = model.jittered(0.05, 1);
     let net = quad_net(&model);
-    let (surface, report) =
-        solve_joint(&net, &*model.surface, &JointOptions::default(), |_| ControlFlow::Continue(()))
-            .unwrap();
+    let input = Input::near_surface(&net, &*model.surface);
+    let solution = solve(&input, &Options::default(), &mut ()).unwrap();
+    let (surface, report) = (solution.result, solution.report);
     let kinks = surface.kink_statistics();
     let planarity = star_planarity(surface.net());
     let (low, high) = surface
@@ -40,9 +38,9 @@ fn check_near(name: &str, model: AsymptoticNet, mean_distance: f64, max_distance
          {} steps, C {:?}",
         kinks.max.to_degrees(),
         report.iterations,
-        report.constraint_max,
+        solution.violation,
     );
-    assert_eq!(report.status, Status::Converged, "{name}: {:?}", report.constraint_max);
+    assert_eq!(report.status, Status::Converged, "{name}: {:?}", solution.violation);
     assert!(kinks.max.to_degrees() <= 1e-9, "{name}: kink {} deg", kinks.max.to_degrees());
     assert!(planarity <= 1e-12, "{name}: star planarity {planarity}");
     assert_eq!(kinks.folds, 0, "{name}");
@@ -80,14 +78,11 @@ fn flat_points_and_holes_become_exact() {
 
 fn with_boundary(model: &AsymptoticNet, boundary: Boundary) -> (Status, f64, f64) {
     let net = quad_net(model);
-    let reference = TriMesh::from_poly_mesh(net.mesh());
-    let field = AsymptoticField::new(&reference);
-    let relaxed = not_negatively_curved(&net, &field);
-    let options = JointOptions { boundary, relaxed, ..JointOptions::default() };
-    let go_on = |_: &_| ControlFlow::Continue(());
-    let (surface, report) = solve_joint(&net, &reference, &options, go_on).unwrap();
+    let options = Options { boundary, ..Options::default() };
+    let solution = solve(&Input::new(&net), &options, &mut ()).unwrap();
+    let surface = solution.result;
     let moved = BoundaryPolygon::deviation(&net, surface.net()) / net.mesh().mean_edge_length();
-    (report.status, surface.kink_statistics().max.to_degrees(), moved)
+    (solution.report.status, surface.kink_statistics().max.to_degrees(), moved)
 }
 
 #[test]

@@ -3,30 +3,28 @@
 
 use fixtures::asymptotic_nets::{self, AsymptoticNet};
 use geom_core::PolyMesh;
-use hyperbolic_nets::{
-    FairnessOrder, PublishedOptions, QuadNet, Spread, StarPlanarity, solve_published,
-};
-use std::ops::ControlFlow;
+use hyperbolic_nets::{FairnessOrder, Input, Options, QuadNet, Spread, StarPlanarity, solve};
 
-fn run(model: &AsymptoticNet, options: &PublishedOptions) -> (f64, f64, f64) {
+fn run(model: &AsymptoticNet, options: &Options) -> (f64, f64, f64) {
     let mesh = PolyMesh::new(model.positions.clone(), &model.quads).unwrap();
     let net = QuadNet::new(&mesh).unwrap();
-    let go_on = |_: &_| ControlFlow::Continue(());
-    let (surface, _) = solve_published(&net, &*model.surface, options, go_on).unwrap();
+    let input = Input::near_surface(&net, &*model.surface);
+    let surface = solve(&input, options, &mut ()).unwrap().result;
     let kinks = surface.kink_statistics();
     let planarity = hyperbolic_nets::star_planarity(surface.net());
     (kinks.max.to_degrees(), kinks.mean.to_degrees(), planarity)
 }
 
-fn weights(fairness: f64, proximity: f64, frame: f64) -> PublishedOptions {
-    PublishedOptions { fairness, proximity, frame, ..PublishedOptions::default() }
+fn weights(fairness: f64, proximity: f64, frame: f64) -> Options {
+    let (fairness, proximity, frame) = (Some(fairness), Some(proximity), Some(frame));
+    Options { fairness, proximity, frame, ..Options::published() }
 }
 
 /// Worst of the seeds against 1.3 times the recorded largest and mean kink, in degrees.
 fn check(
     name: &str,
     make: impl Fn() -> AsymptoticNet,
-    options: &PublishedOptions,
+    options: &Options,
     seeds: u64,
     want: (f64, f64),
 ) {
@@ -86,12 +84,8 @@ fn every_variant_flattens_the_stars() {
     for planarity in [StarPlanarity::Quads, StarPlanarity::Normals] {
         for fairness_order in [FairnessOrder::Second, FairnessOrder::Third] {
             for spread in [Spread::BreadthFirst, Spread::LeastSquares] {
-                let options = PublishedOptions {
-                    planarity,
-                    fairness_order,
-                    spread,
-                    ..weights(0.05, 0.08, 0.6)
-                };
+                let options =
+                    Options { planarity, fairness_order, spread, ..weights(0.05, 0.08, 0.6) };
                 let (kink, _, star) = run(&model, &options);
                 eprintln!(
                     "{planarity:?} {fairness_order:?} {spread:?}: {kink:.3} deg, star {star:.1e} from {before:.1e}"

@@ -1,19 +1,18 @@
 //! `umbilic fair QUADS -o OUT`.
 
-use crate::args::{ConfigArgs, ConvergedArgs, OutputArgs, ReportArgs};
+use crate::args::{CheckpointArgs, ConfigArgs, ConvergedArgs, OutputArgs, ReportArgs};
 use crate::context::Context;
 use crate::failure::Failure;
-use crate::layered;
+use crate::option_flags::{OptionFlags, list, refused};
 use crate::outcome::Outcome;
 use crate::report_support;
 use crate::watch::Watch;
 use curvature_variation::{
-    BlendKind, Constraints, Energy, Functional, Input, Method, Options, Rings, Solution,
-    SplinePatches, SurfaceSamples, Symmetry, solve, spline_patches,
+    Constraints, Functional, Input, Options, Solution, SplinePatches, SurfaceSamples, solve,
+    spline_patches,
 };
 use exchange::{Field, LengthUnit, Mesh, Model, NamedSurface};
 use geom_core::{DVec3, UmbilicKind};
-use gp_solver::OptionValue;
 use report::{EnergyHistory, FieldScale, LineRole, LineSet, ScalarField, Series, SurfaceView};
 use serde::Deserialize;
 use std::collections::BTreeMap;
@@ -34,113 +33,51 @@ pub(crate) struct Fair {
     #[command(flatten)]
     output: OutputArgs,
     #[command(flatten)]
-    settings: Settings,
+    options: OptionFlags<Options>,
+    #[command(flatten)]
+    files: FileArgs,
     #[command(flatten)]
     config: ConfigArgs,
+    #[command(flatten)]
+    checkpoint: CheckpointArgs,
     #[command(flatten)]
     converged: ConvergedArgs,
     #[command(flatten)]
     report: ReportArgs,
 }
 
-/// Options of the method, from flags or the configuration file.
-#[derive(Debug, Default, clap::Args, Deserialize)]
-#[serde(default, deny_unknown_fields)]
-struct Settings {
-    /// What to minimise, a sum such as 0.92*bending + 0.08*mehlum_tarrou [default: mehlum_tarrou]
-    #[arg(long, value_name = "EXPR", allow_hyphen_values = true)]
-    energy: Option<String>,
-    /// Refinements, each followed by a minimisation [default: 2]
-    #[arg(long, value_name = "N")]
-    levels: Option<usize>,
-    /// Steps per level at most [default: 2000]
-    #[arg(long, value_name = "N")]
-    iterations: Option<usize>,
-    /// How to descend [default: lagged-gauss-newton]
-    #[arg(long, value_enum)]
-    method: Option<MethodName>,
-    /// Surface at extraordinary vertices: free curvature, or the published flat spot
-    /// [default: smooth]
-    #[arg(long, value_enum)]
-    blend: Option<BlendName>,
-    /// Rings of patches a smooth blend covers where there is room: a number, or auto for more of
-    /// them on finer meshes [default: auto]
-    #[arg(long, value_name = "N|auto")]
-    #[arg(value_parser = Rings::read)]
-    blend_rings: Option<Rings>,
-    /// Keep the boundary and the two rings next to it
-    #[arg(long, num_args = 0, default_missing_value = "true")]
-    clamp_boundary: Option<bool>,
+/// Files that say what is to be kept.
+#[derive(Debug, clap::Args)]
+struct FileArgs {
     /// Fixed vertices, pinned or pulled limit points, pinned tangent planes
     #[arg(long, value_name = "FILE.ron")]
     fix: Option<PathBuf>,
     /// Stay among the blends of the input and this mesh of the same faces; repeatable
     #[arg(long, value_name = "QUADS")]
-    family: Option<Vec<PathBuf>>,
+    family: Vec<PathBuf>,
     /// Semi-sharp and sharp edges, corners
     #[arg(long, value_name = "FILE.ron")]
     creases: Option<PathBuf>,
-    /// Symmetries to keep: auto, none, or a RON file with matrices [default: auto]
-    #[arg(long, value_name = "auto|none|FILE.ron")]
-    symmetry: Option<String>,
-}
-
-layered!(Settings {
-    energy,
-    levels,
-    iterations,
-    method,
-    blend,
-    blend_rings,
-    clamp_boundary,
-    fix,
-    family,
-    creases,
-    symmetry
-});
-
-#[derive(Clone, Copy, Debug, clap::ValueEnum, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-enum MethodName {
-    LaggedGaussNewton,
-    GaussNewton,
-    Sobolev,
-    Lbfgs,
-}
-
-#[derive(Clone, Copy, Debug, clap::ValueEnum, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-enum BlendName {
-    Smooth,
-    Flat,
 }
 
 impl Fair {
     pub(crate) fn run(self, context: &Context) -> Result<Outcome, Failure> {
         self.output.check()?;
         self.report.check()?;
-        let settings = self.settings.over(self.config.load()?);
-        let family = settings.family.clone().unwrap_or_default();
-        let Resolved { options, constraints, creases: listed, symmetries } = settings.resolve()?;
-        let held = !constraints.is_empty() || options.clamp_boundary || listed.is_some();
-        if held && !family.is_empty() {
+        let options = self.options.options(&self.config)?;
+        let files = &self.files;
+        let held = files.fix.is_some() || files.creases.is_some() || options.clamp_boundary;
+        if held && !files.family.is_empty() {
             return Err(Failure::usage(
                 "--family leaves no vertex to fix; drop --fix, --creases and --clamp-boundary",
             ));
         }
         let model =
             exchange::read_model(&self.input).map_err(|e| Failure::input(&self.input, e))?;
-        let mesh = read_control_mesh(&self.input, &model)?;
-        let creases = match &listed {
-            Some((path, list)) => list.for_mesh(&mesh).map_err(|e| Failure::input(path, e))?,
-            None => Creases::none(),
-        };
-        let members = family.iter().map(|path| read_member(path)).collect::<Result<Vec<_>, _>>()?;
-        let input = Input { mesh, creases, constraints, members, symmetries };
-        let mut watch = Watch::new(context, "fairing");
+        let input = self.read(&model)?;
+        let mut watch = Watch::new(context, "fairing").with_checkpoints(&self.checkpoint)?;
         let mut result =
-            solve(&input, &options, &mut watch).map_err(|e| Failure::input(&self.input, e))?;
-        drop(watch);
+            solve(&input, &options, &mut watch).map_err(|e| refused::<Options>(&self.input, e))?;
         result.metrics.peak_memory_mb = peak_memory_mb();
         let splines = match self.output.output.iter().find(|path| is_spline_file(path)) {
             Some(path) => Some(
@@ -155,6 +92,7 @@ impl Fair {
         let mut outcome = Outcome::new(result.report.status, result.report.iterations)
             .with_input(&self.input)
             .with_metrics(&result.metrics)?;
+        watch.finish(&mut outcome)?;
         outcome.summary = summary(&result, &options);
         outcome.warnings.clone_from(&model.warnings);
         let fitted = splines.as_ref().and_then(|s| s.warning(&result.result));
@@ -170,6 +108,7 @@ impl Fair {
         }
         if self.report.wanted() {
             let mut page = report_support::new("Fairing of a subdivision surface");
+            list(&mut page, &options, &[]);
             fill_report(&mut page, &result, &options, &model.unit)?;
             report_support::add_files(&mut outcome, &self.report, context, page)?;
         }
@@ -177,63 +116,33 @@ impl Fair {
     }
 }
 
-/// What the flags and the files they name come to.
-struct Resolved {
-    options: Options,
-    constraints: Constraints,
-    /// With the file, for messages.
-    creases: Option<(PathBuf, CreaseList)>,
-    symmetries: Option<Vec<[[f64; 3]; 3]>>,
-}
-
-impl Settings {
-    fn resolve(self) -> Result<Resolved, Failure> {
-        let defaults = Options::default();
-        let energy = match &self.energy {
-            Some(text) => text.parse::<Energy>().map_err(Failure::usage)?,
-            None => defaults.energy,
-        };
-        let (symmetry, symmetries) = match self.symmetry.as_deref() {
-            None | Some("auto") => (Symmetry::Auto, None),
-            Some("none") => (Symmetry::None, None),
-            Some(file) => {
-                let path = Path::new(file);
-                let declared: SymmetryFile =
+impl Fair {
+    /// The mesh and what the files say of it.
+    fn read(&self, model: &Model) -> Result<Input, Failure> {
+        let mesh = read_control_mesh(&self.input, model)?;
+        let creases = match &self.files.creases {
+            None => Creases::none(),
+            Some(path) => {
+                let list: CreaseList =
                     exchange::read_ron(path).map_err(|e| Failure::input(path, e))?;
-                (Symmetry::Auto, Some(declared.matrices))
+                list.for_mesh(&mesh).map_err(|e| Failure::input(path, e))?
             }
         };
-        let constraints = match &self.fix {
+        let constraints = match &self.files.fix {
             Some(path) => exchange::read_ron(path).map_err(|e| Failure::input(path, e))?,
             None => Constraints::default(),
         };
-        let options = Options {
-            energy,
-            levels: self.levels.unwrap_or(defaults.levels),
-            iterations: self.iterations.unwrap_or(defaults.iterations),
-            method: self.method.map_or(defaults.method, |m| match m {
-                MethodName::LaggedGaussNewton => Method::LaggedGaussNewton,
-                MethodName::GaussNewton => Method::GaussNewton,
-                MethodName::Sobolev => Method::Sobolev,
-                MethodName::Lbfgs => Method::Lbfgs,
-            }),
-            blend: self.blend.map_or(defaults.blend, |b| match b {
-                BlendName::Smooth => BlendKind::Smooth,
-                BlendName::Flat => BlendKind::Flat,
-            }),
-            blend_rings: self.blend_rings.unwrap_or(defaults.blend_rings),
-            clamp_boundary: self.clamp_boundary.unwrap_or(defaults.clamp_boundary),
-            symmetry,
-            ..defaults
-        };
-        let creases = match self.creases {
-            Some(path) => {
-                let list = exchange::read_ron(&path).map_err(|e| Failure::input(&path, e))?;
-                Some((path, list))
-            }
+        let symmetries = match self.options.file("symmetry") {
             None => None,
+            Some(path) => {
+                let declared: SymmetryFile =
+                    exchange::read_ron(path).map_err(|e| Failure::input(path, e))?;
+                Some(declared.matrices)
+            }
         };
-        Ok(Resolved { options, constraints, creases, symmetries })
+        let members = self.files.family.iter().map(|path| read_member(path));
+        let members = members.collect::<Result<Vec<_>, _>>()?;
+        Ok(Input { mesh, creases, constraints, members, symmetries })
     }
 }
 

@@ -1,13 +1,15 @@
 //! `umbilic fit MESH|POINTS -o SURFACE`.
 
-use crate::args::{ConfigArgs, Counts, OutputArgs, ReportArgs};
+use crate::args::{ConfigArgs, OutputArgs, ReportArgs};
 use crate::context::Context;
 use crate::failure::Failure;
+use crate::option_flags::OptionFlags;
 use crate::outcome::{Outcome, Status};
 use crate::report_support::{self, jets::spline_view};
 use bspline::{Degree, GridFit, GridFitOptions, fit_grid};
 use exchange::Model;
 use geom_core::{BoundingBox, DVec3, QuadGrid};
+use gp_solver::Counts;
 use serde::{Deserialize, Serialize};
 use std::path::PathBuf;
 
@@ -22,27 +24,24 @@ pub(crate) struct Fit {
     #[command(flatten)]
     config: ConfigArgs,
     #[command(flatten)]
-    options: Options,
+    options: OptionFlags<Options>,
     #[command(flatten)]
     report: ReportArgs,
 }
 
-/// Options of the method.
-#[derive(Debug, Default, clap::Args, Deserialize)]
-#[serde(default, deny_unknown_fields)]
-struct Options {
-    /// Numbers of control points (default: as few as meet the tolerance)
-    #[arg(long, value_name = "UxV")]
-    ctrl: Option<Counts>,
-    /// Degree in both directions, 1 to 15 (default: 4)
-    #[arg(long, value_name = "N")]
-    degree: Option<usize>,
-    /// Largest distance of a point to the surface (default: 0.1 % of the diagonal)
-    #[arg(long, value_name = "L")]
-    tolerance: Option<f64>,
+gp_solver::options! {
+    /// Options of the fit.
+    #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+    #[serde(default, deny_unknown_fields)]
+    struct Options {
+        /// Numbers of control points; without them as few as meet the tolerance.
+        ctrl: Option<Counts> = None;
+        /// Degree in both directions, 1 to 15; 4 if not given.
+        degree: Option<usize> = None;
+        /// Largest distance of a point to the surface; 0.1 % of the diagonal if not given.
+        tolerance: Option<f64> = None;
+    }
 }
-
-crate::layered!(Options { ctrl, degree, tolerance });
 
 /// The points to fit, row by row.
 struct Points {
@@ -56,7 +55,7 @@ impl Fit {
     pub(crate) fn run(self, context: &Context) -> Result<Outcome, Failure> {
         self.output.check()?;
         self.report.check()?;
-        let options = self.options.over(self.config.load()?);
+        let options = self.options.options(&self.config)?;
         let settings = settings(&options)?;
         let model =
             exchange::read_model(&self.input).map_err(|e| Failure::input(&self.input, e))?;

@@ -1,9 +1,9 @@
 //! `umbilic panel SURFACE -o OUT`.
 
-use crate::args::{ConfigArgs, ConvergedArgs, Counts, ReportArgs, SheetSize, check_output_path};
+use crate::args::{CheckpointArgs, ConfigArgs, ConvergedArgs, ReportArgs, check_output_path};
 use crate::context::Context;
 use crate::failure::Failure;
-use crate::layered;
+use crate::option_flags::{OptionFlags, list, refused};
 use crate::outcome::{Outcome, Status};
 use crate::panel_files::{PANEL_OUTPUTS, encode};
 use crate::report_support;
@@ -12,13 +12,7 @@ use crate::surface_file::read_surface;
 use crate::watch::Watch;
 use bspline::BsplineSurface;
 use exchange::LengthUnit;
-use gp_solver::List;
-use paneling::{
-    Clustering, Error, Input, Layout, MoldType, Options, Paneling, Pattern, PriceList, Solution,
-    solve,
-};
-use report::Report;
-use serde::{Deserialize, Serialize};
+use paneling::{Error, Input, Layout, MoldType, Options, Paneling, PriceList, Solution, solve};
 use std::path::{Path, PathBuf};
 
 /// Arguments of `panel`.
@@ -34,153 +28,35 @@ pub(crate) struct Panel {
     #[arg(short, long = "output", value_name = "FILE", required = true)]
     output: Vec<PathBuf>,
     #[command(flatten)]
-    options: PanelOptions,
+    options: OptionFlags<Options>,
+    /// Prices of molds and panels by type (RON)
+    #[arg(long, value_name = "FILE.ron")]
+    prices: Option<PathBuf>,
     #[command(flatten)]
     config: ConfigArgs,
+    #[command(flatten)]
+    checkpoint: CheckpointArgs,
     #[command(flatten)]
     converged: ConvergedArgs,
     #[command(flatten)]
     report: ReportArgs,
 }
 
-/// Options that may also stand in the configuration file.
-#[derive(Debug, Default, clap::Args, Deserialize)]
-#[serde(default, deny_unknown_fields)]
-pub(crate) struct PanelOptions {
-    /// Number of panels in u and v (default 30x30)
-    #[arg(long, value_name = "UxV")]
-    panels: Option<Counts>,
-    /// quad (default), staggered, triangle, hexagon, diagonal, or an OBJ file over the unit square
-    #[arg(long, value_name = "LAYOUT")]
-    layout: Option<String>,
-    /// Equal steps of mean arc length instead of equal parameter steps
-    #[arg(long, num_args = 0, default_missing_value = "true")]
-    equal_arc_length: Option<bool>,
-    /// own (default): by panel shape; grid: the published grid over the curvature diagram;
-    /// cover: greedy covering by cost
-    #[arg(long, value_name = "NAME")]
-    clustering: Option<String>,
-    /// k √N molds for N panels (default 3)
-    #[arg(long)]
-    k: Option<f64>,
-    /// Number of molds
-    #[arg(long, value_name = "M")]
-    molds: Option<usize>,
-    /// Find the cheapest molds with every kink at most this
-    #[arg(long, value_name = "X")]
-    max_kink_deg: Option<f64>,
-    /// Find the cheapest molds with every gap at most this, in model units
-    #[arg(long, value_name = "L")]
-    max_gap: Option<f64>,
-    /// Types of molds: plane, cylinder, sphere, paraboloid, torus, cubic (default cubic); several
-    /// only together with bounds
-    #[arg(long, value_name = "TYPES", value_delimiter = ',')]
-    mold_types: Option<Vec<MoldType>>,
-    /// Prices of molds and panels by type (RON)
-    #[arg(long, value_name = "FILE.ron")]
-    prices: Option<PathBuf>,
-    /// Most steps of the joint seam step (default 40); 0 leaves it out
-    #[arg(long, value_name = "N")]
-    seam_steps: Option<usize>,
-    /// Width and height of the sheets for flat outlines, in model units (default: one large sheet)
-    #[arg(long, value_name = "WxH")]
-    sheet: Option<SheetSize>,
-}
-
-layered!(PanelOptions {
-    panels,
-    layout,
-    equal_arc_length,
-    clustering,
-    k,
-    molds,
-    max_kink_deg,
-    max_gap,
-    mold_types,
-    prices,
-    seam_steps,
-    sheet,
-});
-
-impl PanelOptions {
-    /// Whether there is a rule for the number of molds; refuses several.
-    fn has_rule(&self) -> Result<bool, Failure> {
-        let has_bounds = self.max_kink_deg.is_some() || self.max_gap.is_some();
-        let rules = [self.k.is_some(), self.molds.is_some(), has_bounds];
-        match rules.iter().filter(|r| **r).count() {
-            2.. => Err(Failure::usage(Error::SeveralRules)),
-            count => Ok(count == 1),
-        }
+/// The layout of a file, or the pattern the options ask for.
+fn layout(
+    file: Option<&Path>,
+    options: &Options,
+    surface: &BsplineSurface,
+) -> Result<Option<Layout>, Failure> {
+    let Some(path) = file else { return Ok(None) };
+    if options.panels.is_some() {
+        return Err(Failure::usage(
+            "--panels has no meaning with a layout file; drop one of the two",
+        ));
     }
-
-    /// The options of the library.
-    fn settings(&self) -> Result<Options, Failure> {
-        let defaults = Options::default();
-        Ok(Options {
-            clustering: self.clustering()?,
-            k: self.k,
-            molds: self.molds,
-            max_kink_deg: self.max_kink_deg,
-            max_gap: self.max_gap,
-            mold_types: self.mold_types.clone().map_or(defaults.mold_types, List),
-            seam_steps: self.seam_steps.unwrap_or(defaults.seam_steps),
-            ..Options::default()
-        })
-    }
-
-    /// The options in force, for the report.
-    fn list(&self, report: &mut Report, paneling: &Paneling) {
-        report.option("panels", paneling.labels.len());
-        report.option("molds", paneling.molds.len());
-        report.option("layout", self.layout.as_deref().unwrap_or("quad"));
-        report.option("equal arc length", self.equal_arc_length.unwrap_or(false));
-        report.option("clustering", self.clustering.as_deref().unwrap_or("own"));
-        if let Some(kink) = self.max_kink_deg {
-            report.option("largest kink", format!("{kink}°"));
-        }
-        if let Some(gap) = self.max_gap {
-            report.option("largest gap", format!("{gap} {}", report.length_unit).trim_end());
-        }
-        let types = self.mold_types.as_deref().unwrap_or(&[MoldType::Cubic]);
-        report.option("mold types", types.iter().map(|t| t.name()).collect::<Vec<_>>().join(", "));
-        if let Some(path) = &self.prices {
-            report.option("prices", path.display());
-        }
-        let most = self.seam_steps.unwrap_or_else(|| Options::default().seam_steps);
-        report.option("most seam steps", most);
-    }
-
-    fn clustering(&self) -> Result<Clustering, Failure> {
-        match self.clustering.as_deref() {
-            None | Some("own") => Ok(Clustering::Own),
-            Some("grid") => Ok(Clustering::Grid),
-            Some("cover") => Ok(Clustering::Cover),
-            Some(other) => {
-                Err(Failure::usage(format!("unknown clustering `{other}`; use own, grid or cover")))
-            }
-        }
-    }
-
-    fn layout(&self, surface: &BsplineSurface) -> Result<Layout, Failure> {
-        let name = self.layout.as_deref().unwrap_or("quad");
-        let layout = if let Some(pattern) = Pattern::from_name(name) {
-            let Counts { u, v } = self.panels.unwrap_or(Counts { u: 30, v: 30 });
-            let closed = [surface.knots_u().is_periodic(), surface.knots_v().is_periodic()];
-            Layout::generate(pattern, u, v, closed).map_err(Failure::usage)?
-        } else if name.to_lowercase().ends_with(".obj") {
-            if self.panels.is_some() {
-                let message = "panels has no meaning with a layout file; drop one of the two";
-                return Err(Failure::usage(message));
-            }
-            layout_file(Path::new(name))?
-        } else {
-            return Err(Failure::usage(format!(
-                "unknown layout `{name}`; use quad, staggered, triangle, hexagon, diagonal or an OBJ file"
-            )));
-        };
-        let even = self.equal_arc_length.unwrap_or(false);
-        Ok(if even { layout.with_equal_arc_length(surface) } else { layout })
-    }
+    let layout = layout_file(path)?;
+    let even = options.equal_arc_length;
+    Ok(Some(if even { layout.with_equal_arc_length(surface) } else { layout }))
 }
 
 fn layout_file(path: &Path) -> Result<Layout, Failure> {
@@ -198,41 +74,36 @@ impl Panel {
     pub(crate) fn run(self, context: &Context) -> Result<Outcome, Failure> {
         self.check_outputs()?;
         self.report.check()?;
-        let mut config: PanelOptions = self.config.load()?;
-        if self.options.has_rule()? {
-            // A rule on the command line replaces whatever rule the file has.
-            config =
-                PanelOptions { k: None, molds: None, max_kink_deg: None, max_gap: None, ..config };
-        }
-        let options = self.options.over(config);
-        let settings = options.settings()?;
+        let options = self.options.options(&self.config)?;
         let (model, named) = read_surface(&self.surface)?;
         let unit = model.unit;
-        let layout = options.layout(&named.surface)?;
-        let prices = match &options.prices {
+        let layout = layout(self.options.file("layout"), &options, &named.surface)?;
+        let prices = match &self.prices {
             None => PriceList::counting_molds(),
             Some(path) => exchange::read_ron(path).map_err(|e| Failure::input(path, e))?,
         };
-        let input = Input::from(&named.surface).with_layout(&layout).with_prices(prices);
-        let solution = solve(input, &settings, &mut Watch::new(context, "panelling")).map_err(
-            |e| match e {
-                Error::Singular { .. } => Failure::input(&self.surface, e),
-                Error::NoPrice { .. } | Error::BadPrice { .. } => match &options.prices {
-                    Some(path) => Failure::input(path, e),
-                    None => Failure::usage(e),
-                },
-                _ => Failure::usage(e),
-            },
-        )?;
+        let mut input = Input::from(&named.surface).with_prices(prices);
+        if let Some(layout) = &layout {
+            input = input.with_layout(layout);
+        }
+        let mut watch = Watch::new(context, "panelling").with_checkpoints(&self.checkpoint)?;
+        let solution = solve(input, &options, &mut watch).map_err(|e| {
+            let file = match (&e, &self.prices) {
+                (Error::NoPrice { .. } | Error::BadPrice { .. }, Some(prices)) => prices,
+                _ => &self.surface,
+            };
+            refused::<Options>(file, e)
+        })?;
         let (paneling, set) = (&solution.result, &solution.panels);
         let mut outcome = Outcome::new(solution.report.status, paneling.iterations())
             .with_input(&self.surface)
             .with_metrics(&solution.metrics)?;
+        watch.finish(&mut outcome)?;
         outcome.warnings = model.warnings;
         outcome.require_converged = self.converged.require_converged;
         outcome.summary = summary(&solution, &unit);
         for path in self.output {
-            let sheet = options.sheet.map(|s| s.0);
+            let sheet = options.sheet.map(|s| [s.width, s.height]);
             let files = encode(&path, set, paneling, &unit, sheet)?;
             if ["svg", "dxf"].contains(&exchange::extension_of(&path).as_str()) {
                 outcome.warnings.extend(not_unrolled(paneling, &path));
@@ -242,7 +113,12 @@ impl Panel {
         if self.report.wanted() {
             let bounds = [options.max_kink_deg, options.max_gap];
             let mut report = paneling_report(set, paneling, bounds, &unit.to_string())?;
-            options.list(&mut report, paneling);
+            report.option("panels", paneling.labels.len());
+            report.option("molds", paneling.molds.len());
+            list(&mut report, &options, &["panels", "molds"]);
+            if let Some(path) = &self.prices {
+                report.option("prices", path.display());
+            }
             report_support::add_files(&mut outcome, &self.report, context, report)?;
         }
         Ok(outcome)

@@ -95,6 +95,8 @@ pub struct Run<'a> {
     is_first: bool,
     /// Whether the system has changed since it was linearised.
     is_stale: bool,
+    /// Whether the last step met a stop rule and nothing has changed since.
+    is_settled: bool,
     gradient_norm: f64,
     factorizations_before: usize,
     timings_before: Timings,
@@ -126,7 +128,7 @@ impl<'a> Run<'a> {
         system.refresh(x);
         system.keep_scaling(false);
         system.linearize(x)?;
-        system.keep_scaling(options.damping_rule.keeps_scaling());
+        system.keep_scaling(keeps_scaling(options));
         let start = start_record(&system);
         Ok(Self {
             x: x.to_vec(),
@@ -137,6 +139,7 @@ impl<'a> Run<'a> {
             iterations_before: 0,
             is_first: true,
             is_stale: false,
+            is_settled: false,
             options: options.clone(),
             system,
             factorizations_before,
@@ -160,22 +163,29 @@ impl<'a> Run<'a> {
         self.system.refresh(&self.x);
         self.system.linearize(&self.x)?;
         self.system.set_scaling(scaling);
-        self.system.keep_scaling(self.options.damping_rule.keeps_scaling());
+        self.system.keep_scaling(keeps_scaling(&self.options));
         self.damping = damping;
         self.iterations_before = checkpoint.iteration;
         self.is_first = checkpoint.iteration == 0;
+        // After a Gauss-Newton step the checkpoint has the scaling of where the step began.
+        self.is_stale = matches!(self.options.method, Method::GaussNewton { .. });
+        self.is_settled = checkpoint.counts.contains_key("settled");
         self.history = vec![start_record(&self.system)];
         self.gradient_norm = self.history[0].gradient_norm;
         Ok(())
     }
 
-    /// Adds the state to a checkpoint: `x`, `scaling`, `damping`.
+    /// Adds the state to a checkpoint: `x`, `scaling`, `damping`, and `settled` if the last step met
+    /// a stop rule.
     #[must_use]
     pub fn save(&self, checkpoint: Checkpoint) -> Checkpoint {
-        let checkpoint = checkpoint
+        let mut checkpoint = checkpoint
             .with_numbers("x", &self.x)
             .with_numbers("scaling", self.system.scaling())
             .with_numbers("damping", &[self.damping]);
+        if self.is_settled {
+            checkpoint = checkpoint.with_counts("settled", &[]);
+        }
         Checkpoint { iteration: self.iterations(), ..checkpoint }
     }
 
@@ -192,6 +202,7 @@ impl<'a> Run<'a> {
     pub fn set_x(&mut self, x: &[f64]) {
         self.x.copy_from_slice(x);
         self.is_stale = true;
+        self.is_settled = false;
     }
 
     /// Steps taken, those before a checkpoint included.
@@ -232,6 +243,7 @@ impl<'a> Run<'a> {
     /// it anew.
     pub fn system_mut(&mut self) -> &mut System<'a> {
         self.is_stale = true;
+        self.is_settled = false;
         &mut self.system
     }
 
@@ -317,6 +329,10 @@ impl<'a> Run<'a> {
     /// # Errors
     /// [`SolverError`] if blocks are not finite where the step leads.
     pub fn step(&mut self, observer: &mut dyn Observer) -> Result<Step, SolverError> {
+        // Only a resumed run can have settled before it has taken a step.
+        if std::mem::take(&mut self.is_settled) && self.history.len() == 1 {
+            return Ok(Step::Ended(Status::Converged));
+        }
         if self.is_stale {
             self.system.refresh(&self.x);
             self.system.linearize(&self.x)?;
@@ -333,6 +349,7 @@ impl<'a> Run<'a> {
         }
         let taken = match self.options.method {
             Method::LevenbergMarquardt => self.damped_step(observer)?,
+            _ if observer.stop_requested() => Err(Status::Interrupted),
             Method::GuidedProjection { epsilon } => self.projection_step(epsilon)?,
             Method::GaussNewton { regularization } => self.shortened_step(regularization)?,
         };
@@ -346,8 +363,8 @@ impl<'a> Run<'a> {
         let small_change = self.is_small_change(&taken, energy_before);
         let evidence = !taken.is_held_back || self.gradient_norm <= ALIGNED;
         self.take(&taken)?;
-        let converged = (small_step || small_change) && evidence;
-        Ok(if converged { Step::Ended(Status::Converged) } else { Step::Taken })
+        self.is_settled = (small_step || small_change) && evidence;
+        Ok(if self.is_settled { Step::Ended(Status::Converged) } else { Step::Taken })
     }
 
     fn is_small_change(&self, taken: &Taken, energy: f64) -> bool {
@@ -471,6 +488,12 @@ impl<'a> Run<'a> {
         self.history.push(record);
         Ok(())
     }
+}
+
+/// Whether the scaling is the largest diagonal so far; the share of Gauss-Newton is one of the
+/// diagonal as it is.
+fn keeps_scaling(options: &Options) -> bool {
+    !matches!(options.method, Method::GaussNewton { .. }) && options.damping_rule.keeps_scaling()
 }
 
 fn start_record(system: &System<'_>) -> IterationRecord {

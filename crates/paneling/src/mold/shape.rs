@@ -467,8 +467,8 @@ mod tests {
     #[test]
     fn names_go_both_ways() {
         for kind in MoldType::ALL {
-            assert_eq!(MoldType::from_name(kind.name()), Some(kind));
+            assert_eq!(MoldType::read(kind.name()), Ok(kind));
         }
-        assert_eq!(MoldType::from_name("conic"), None);
+        assert!(MoldType::read("conic").is_err());
     }
 }

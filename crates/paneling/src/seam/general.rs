@@ -103,7 +103,8 @@ mod tests {
             let mut fit = Fit::new(&set, &clusters, &[kind; 3], 0.5, pulse).unwrap();
             fit.alternate(&set, 2, pulse).unwrap();
             // One panel out on its mold, where the reach counts.
-            fit.poses[5].origin += 0.3 * fit.poses[5].rotation.x_axis;
+            let out = 0.3 * fit.poses[5].rotation.x_axis;
+            fit.poses[5].origin += out;
             let run = SeamRun::new(seams, &fit, pulse).unwrap();
             let free = MatrixFree::linearize(seams, &fit, pulse).unwrap();
             let SeamProblem { assembly, problem } = SeamProblem::new(seams, &fit).unwrap();

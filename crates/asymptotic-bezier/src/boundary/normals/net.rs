@@ -168,7 +168,8 @@ fn solved(
     watch.check()?;
     let mut projection = MinNormProjection::new(&exact, x.len(), 3).map_err(Error::Curves)?;
     let options = ProjectionOptions { tolerance: 1e-3 * CLOSED, ..ProjectionOptions::default() };
-    projection.project(&exact, &mut x, &curves.scale(held), &options).map_err(Error::Curves)?;
+    let (scale, stage) = (curves.scale(held), watch.stage().clone());
+    projection.project(&exact, &mut x, &scale, &options, &stage, &mut ()).map_err(Error::Curves)?;
     watch.check()?;
     Ok(x)
 }

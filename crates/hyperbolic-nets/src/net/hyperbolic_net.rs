@@ -1,6 +1,8 @@
 //! A net with a shape parameter for every face: the finished surface, and how smooth it is.
 
-use crate::{BilinearPatch, NetError, PatchError, QuadNet};
+use super::patch::BilinearPatch;
+use super::quad_net::{InnerEdge, QuadNet};
+use crate::{Error, PatchError};
 use geom_core::{ClosestPoint, DVec3};
 use numerics::smallest_eigenvector;
 use rayon::prelude::*;
@@ -32,25 +34,21 @@ impl HyperbolicNet {
     /// diagonals 0–2.
     ///
     /// # Errors
-    /// [`NetError`] if counts do not match or a shape parameter is not positive.
-    pub fn new(
-        net: QuadNet,
-        normals: Option<Vec<DVec3>>,
-        shape: Vec<f64>,
-    ) -> Result<Self, NetError> {
+    /// [`Error`] if counts do not match or a shape parameter is not positive.
+    pub fn new(net: QuadNet, normals: Option<Vec<DVec3>>, shape: Vec<f64>) -> Result<Self, Error> {
         let (faces, vertices) = (net.quads().len(), net.positions().len());
         if shape.len() != faces {
-            return Err(NetError::WrongCount {
+            return Err(Error::WrongCount {
                 what: "shape parameters",
                 found: shape.len(),
                 needed: faces,
             });
         }
         if let Some(found) = normals.as_ref().map(Vec::len).filter(|n| *n != vertices) {
-            return Err(NetError::WrongCount { what: "normals", found, needed: vertices });
+            return Err(Error::WrongCount { what: "normals", found, needed: vertices });
         }
         if let Some(face) = shape.iter().position(|&w| !(w > 0.0 && w < f64::INFINITY)) {
-            return Err(NetError::BadShapeParameter { face, value: shape[face] });
+            return Err(Error::BadShapeParameter { face, value: shape[face] });
         }
         Ok(Self { net, normals, shape })
     }
@@ -102,7 +100,7 @@ impl HyperbolicNet {
     pub fn kink_statistics(&self) -> KinkStatistics {
         let kinks = self.kinks();
         let positions = self.net.positions();
-        let folded = |e: &&crate::InnerEdge| self.net.join(e, positions).is_folded();
+        let folded = |e: &&InnerEdge| self.net.join(e, positions).is_folded();
         KinkStatistics {
             max: kinks.iter().copied().fold(0.0, f64::max),
             mean: kinks.iter().sum::<f64>() / kinks.len().max(1) as f64,
@@ -204,8 +202,8 @@ mod tests {
         let error = HyperbolicNet::new(net.clone(), None, vec![1.0; 3]).unwrap_err();
         assert_eq!(error.to_string(), "shape parameters: 3 values for 4; give one for each");
         let error = HyperbolicNet::new(net.clone(), Some(vec![]), vec![1.0; 4]).unwrap_err();
-        assert!(matches!(error, NetError::WrongCount { what: "normals", .. }));
+        assert!(matches!(error, Error::WrongCount { what: "normals", .. }));
         let error = HyperbolicNet::new(net, None, vec![1.0, 1.0, 0.0, 1.0]).unwrap_err();
-        assert_eq!(error, NetError::BadShapeParameter { face: 2, value: 0.0 });
+        assert_eq!(error, Error::BadShapeParameter { face: 2, value: 0.0 });
     }
 }

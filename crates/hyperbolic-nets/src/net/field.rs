@@ -1,5 +1,6 @@
 //! Curvature of a triangle mesh, and the directions in which it vanishes.
 
+use super::quad_net::QuadNet;
 use geom_core::{
     DMat3, DVec2, DVec3, FirstForm, SecondForm, TriMesh, asymptotic_directions,
     principal_curvatures,
@@ -90,6 +91,16 @@ impl<'a> AsymptoticField<'a> {
         let d = DVec2::new(direction.dot(x), direction.dot(y));
         let angle = |a: DVec2| d.perp_dot(a).abs().atan2(d.dot(a).abs());
         Some(directions.map(angle).into_iter().fold(f64::INFINITY, f64::min))
+    }
+
+    /// Mean of the angle between the edges of a net and the asymptotic directions under their
+    /// midpoints, in radians; edges where there are none do not count.
+    #[must_use]
+    pub fn mean_misalignment(&self, net: &QuadNet) -> f64 {
+        let angle = |[a, b]: [DVec3; 2]| self.misalignment((a + b) / 2.0, b - a);
+        let ends = net.edges().iter().map(|e| e.ends.map(|v| net.positions()[v]));
+        let angles: Vec<f64> = ends.filter_map(angle).collect();
+        angles.iter().sum::<f64>() / angles.len().max(1) as f64
     }
 
     /// Second form in an orthonormal frame of the plane of `normal`, and the frame.

@@ -1,42 +1,41 @@
 //! Lelieuvre normals: vertex vectors whose cross products are the edges of an asymptotic net.
 
-use crate::blocks::{Layout, second_differences};
-use crate::{Family, NetError, QuadNet};
+use super::differences::second_differences;
+use super::quad_net::{Family, QuadNet};
+use super::rows::solve_rows;
+use crate::Error;
 use geom_core::DVec3;
-use gp_solver::{
-    QuadraticBuilder, QuadraticConstraints, SolverError, SparseCholesky, SymmetricPattern,
-};
-
-/// Positions stand first among the six unknowns of a vertex.
-pub(crate) const POSITION: Layout = Layout { stride: 6, offset: 0 };
-/// Normals follow.
-pub(crate) const NORMAL: Layout = Layout { stride: 6, offset: 3 };
+use gp_solver::SolverError;
 
 /// First guess of the normals, and the sign of every edge.
 #[derive(Clone, Debug, PartialEq)]
-pub(crate) struct LelieuvreStart {
-    pub(crate) normals: Vec<DVec3>,
+pub struct LelieuvreStart {
+    /// A normal for every vertex; its length has the unit of the root of a length.
+    pub normals: Vec<DVec3>,
     /// `s_e` in `x_j − x_i = s_e ν_i × ν_j`: +1 for one family, −1 for the other.
-    pub(crate) signs: Vec<f64>,
+    pub signs: Vec<f64>,
     /// Edges that twist against the sign of their family.
-    pub(crate) wrong: usize,
+    pub wrong_twists: usize,
 }
 
 impl LelieuvreStart {
     /// `ν_i = ρ_i n_i` with unit vertex normals `n` and `log ρ_i + log ρ_j = log(|x_ij| / |n_i × n_j|)`
     /// on every edge in the least-squares sense.
-    pub(crate) fn new(net: &QuadNet, positions: &[DVec3]) -> Result<Self, NetError> {
+    ///
+    /// # Errors
+    /// [`Error::NoTangentPlane`] names a vertex, [`Error::Linear`] the solver's reason.
+    pub fn new(net: &QuadNet) -> Result<Self, Error> {
+        let positions = net.positions();
         let unit = net.vertex_normals(positions);
         if let Some(vertex) = unit.iter().position(|n| *n == DVec3::ZERO) {
-            return Err(NetError::NoTangentPlane { vertex });
+            return Err(Error::NoTangentPlane { vertex });
         }
-        let (signs, wrong) = signs(net, positions, &unit);
-        let log_lengths = log_lengths(net, positions, &unit).map_err(|e| NetError::Linear {
-            what: "the lengths of normals",
-            message: e.to_string(),
-        })?;
+        let (signs, wrong_twists) = signs(net, positions, &unit);
+        let what = "the lengths of normals";
+        let log_lengths =
+            log_lengths(net, positions, &unit).map_err(|source| Error::Linear { what, source })?;
         let normals = unit.iter().zip(log_lengths).map(|(n, l)| *n * l.exp()).collect();
-        Ok(Self { normals, signs, wrong })
+        Ok(Self { normals, signs, wrong_twists })
     }
 }
 
@@ -93,57 +92,11 @@ fn log_lengths(
     solve_rows(n, &rows, 1e-8)
 }
 
-/// Least squares of sparse rows `Σ a_k y_k = b`, with `shift` added to the diagonal.
-pub(crate) fn solve_rows(
-    unknowns: usize,
-    rows: &[(Vec<(usize, f64)>, f64)],
-    shift: f64,
-) -> Result<Vec<f64>, SolverError> {
-    let pairs = rows.iter().flat_map(|(row, _)| {
-        row.iter().flat_map(move |&(i, _)| row.iter().map(move |&(j, _)| (i, j)))
-    });
-    let pattern = SymmetricPattern::new(unknowns, pairs)?;
-    let mut values = vec![0.0; pattern.len()];
-    let mut rhs = vec![0.0; unknowns];
-    for &start in &pattern.column_starts()[..unknowns] {
-        values[start] = shift;
-    }
-    for (row, b) in rows {
-        for (k, &(i, a)) in row.iter().enumerate() {
-            rhs[i] += a * b;
-            for &(j, c) in &row[..=k] {
-                values[pattern.slot(i, j).unwrap_or_default()] += a * c;
-            }
-        }
-    }
-    let mut cholesky = SparseCholesky::new(pattern)?;
-    cholesky.factor(&values)?;
-    cholesky.solve_in_place(&mut rhs);
-    Ok(rhs)
-}
-
-/// The equations `(x_j − x_i − s_e ν_i × ν_j) / h = 0` of all edges.
-pub(crate) fn constraints(net: &QuadNet, signs: &[f64], h: f64) -> QuadraticConstraints {
-    let mut builder = QuadraticBuilder::new("asymptotic and smooth");
-    for (e, &sign) in net.edges().iter().zip(signs) {
-        let [i, j] = e.ends;
-        for c in 0..3 {
-            let (a, b) = ((c + 1) % 3, (c + 2) % 3);
-            builder
-                .equation(1.0)
-                .linear(POSITION.column(j, c), 1.0 / h)
-                .linear(POSITION.column(i, c), -1.0 / h)
-                .product(NORMAL.column(i, a), NORMAL.column(j, b), -sign / h)
-                .product(NORMAL.column(i, b), NORMAL.column(j, a), sign / h);
-        }
-    }
-    builder.build()
-}
-
 /// `W = |ν₁ + ν₃| / |ν₀ + ν₂|` of every face: with single-valued normals these make all patches
 /// join smoothly, since `ν₀ + ν₂` and `ν₁ + ν₃` are parallel (the discrete Moutard equation,
 /// Bobenko and Suris 2008, §2.4) and so is the shape ratio of any two neighbours.
-pub(crate) fn shape_parameters(net: &QuadNet, normals: &[DVec3]) -> Vec<f64> {
+#[must_use]
+pub fn shape_parameters(net: &QuadNet, normals: &[DVec3]) -> Vec<f64> {
     net.quads()
         .iter()
         .map(|q| {
@@ -156,6 +109,9 @@ pub(crate) fn shape_parameters(net: &QuadNet, normals: &[DVec3]) -> Vec<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::blocks::edge_equations;
+    use crate::options::Options;
+    use crate::vectors::unknowns;
     use fixtures::asymptotic_nets;
     use geom_core::PolyMesh;
     use gp_solver::ResidualBlock;
@@ -167,11 +123,13 @@ mod tests {
         let net = QuadNet::new(&mesh).unwrap();
         let (signs, wrong) = signs(&net, net.positions(), &model.normals);
         assert_eq!(wrong, 0);
-        let block = constraints(&net, &signs, mesh.mean_edge_length());
-        let mut x = vec![0.0; 6 * net.positions().len()];
+        let (variables, positions, normals) = unknowns(&net, &Options::default());
+        let normals = normals.unwrap();
+        let block = edge_equations(&net, &signs, positions, normals, mesh.mean_edge_length());
+        let mut x = vec![0.0; variables.len()];
         for v in 0..net.positions().len() {
-            x[6 * v..6 * v + 3].copy_from_slice(&net.positions()[v].to_array());
-            x[6 * v + 3..6 * v + 6].copy_from_slice(&model.normals[v].to_array());
+            positions.set(&mut x, v, net.positions()[v].to_array());
+            normals.set(&mut x, v, model.normals[v].to_array());
         }
         let mut residuals = vec![0.0; block.len()];
         block.residuals(&x, &mut residuals);

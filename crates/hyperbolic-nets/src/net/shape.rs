@@ -1,12 +1,16 @@
 //! Shape parameters of the patches over a given asymptotic net (Shi et al. 2014, §3.2, step 2).
 
-use crate::lelieuvre::solve_rows;
-use crate::{NetError, QuadNet};
+use super::quad_net::QuadNet;
+use super::rows::solve_rows;
+use crate::Error;
 use geom_core::DVec3;
+use gp_solver::choices;
+use serde::{Deserialize, Serialize};
 use std::collections::VecDeque;
 
 /// How shape parameters spread over the net.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
 pub enum Spread {
     /// From face to face, breadth first, starting with `W = 1`, as published. On a net that is
     /// not exact all errors end up where the search meets itself, and where vertices cannot be
@@ -16,6 +20,8 @@ pub enum Spread {
     #[default]
     LeastSquares,
 }
+
+choices!(Spread { BreadthFirst = "breadth_first", LeastSquares = "least_squares" });
 
 /// Shape parameters and how well they fit.
 #[derive(Clone, Debug, PartialEq)]
@@ -33,12 +39,12 @@ pub struct ShapeFit {
 /// Shape parameters with the ratios of Eq. 7 at all inner edges, and the best free factor.
 ///
 /// # Errors
-/// [`NetError::Linear`] if the least-squares system cannot be solved.
+/// [`Error::Linear`] if the least-squares system cannot be solved.
 pub fn fit_shape_parameters(
     net: &QuadNet,
     positions: &[DVec3],
     spread: Spread,
-) -> Result<ShapeFit, NetError> {
+) -> Result<ShapeFit, Error> {
     let links = Links::new(net, positions);
     let faces = net.quads().len();
     let tree = links.tree(faces);
@@ -184,7 +190,7 @@ impl Links {
         log
     }
 
-    fn least_squares(&self, tree: &Tree, faces: usize) -> Result<Vec<f64>, NetError> {
+    fn least_squares(&self, tree: &Tree, faces: usize) -> Result<Vec<f64>, Error> {
         let mut rows: Vec<(Vec<(usize, f64)>, f64)> = self
             .all
             .iter()
@@ -197,7 +203,7 @@ impl Links {
             rows.push((vec![(component.faces[0], 1.0)], 0.0));
         }
         solve_rows(faces, &rows, 0.0)
-            .map_err(|e| NetError::Linear { what: "shape parameters", message: e.to_string() })
+            .map_err(|source| Error::Linear { what: "shape parameters", source })
     }
 }
 

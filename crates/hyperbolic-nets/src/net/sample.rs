@@ -1,6 +1,8 @@
 //! Points of patches for pictures and meshes, with exact normals and curvatures.
 
-use crate::{HyperbolicNet, PatchError, PatchJet};
+use super::hyperbolic_net::HyperbolicNet;
+use super::patch::PatchJet;
+use crate::PatchError;
 use geom_core::DVec3;
 use rayon::prelude::*;
 
@@ -107,7 +109,7 @@ mod tests {
     fn samples_of_neighbours_agree_in_position_and_normal() {
         let model = asymptotic_nets::moutard(3, 3, 5);
         let net = QuadNet::new(&PolyMesh::new(model.positions, &model.quads).unwrap()).unwrap();
-        let shape = crate::lelieuvre::shape_parameters(&net, &model.normals);
+        let shape = crate::shape_parameters(&net, &model.normals);
         let surface = HyperbolicNet::new(net, None, shape).unwrap();
         let sampled = SampledPatches::new(&surface, 2, PatchJet::sample).unwrap();
         assert_eq!(sampled.samples.len(), 9 * 9);

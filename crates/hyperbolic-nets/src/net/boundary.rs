@@ -1,32 +1,8 @@
-//! What a solve does with the vertices on the boundary.
+//! What the boundary of a net leaves to it.
 
 use crate::QuadNet;
-use crate::blocks::{Target, closest_on_polyline};
-use geom_core::VertexId;
-
-/// How boundary vertices are held.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Boundary {
-    /// Each is drawn to where it started, with the weight of the proximity to nearest points.
-    /// Without this the outermost faces may slide along the surface and collapse.
-    #[default]
-    Anchored,
-    /// As the vertices inside: near the surface, free within it.
-    Free,
-    /// Each stays exactly where it started if an exact net near the input has this boundary, and
-    /// moves as little as it must otherwise: see [`BoundaryPolygon`].
-    Fixed,
-    /// Each stays near the boundary curve of the start and may slide along it; corners (vertices
-    /// with a single face) are anchored.
-    Glide,
-}
-
-impl Boundary {
-    /// Vertices whose positions may not change at all.
-    pub(crate) fn fixed_vertices(self, net: &QuadNet) -> Vec<bool> {
-        net.boundary().iter().map(|&b| b && self == Self::Fixed).collect()
-    }
-}
+use crate::blocks::{Target, Targets, closest_on_polyline};
+use crate::options::Boundary;
 
 /// What a boundary polygon leaves to an exact net.
 ///
@@ -93,13 +69,13 @@ impl BoundaryPolygon {
     #[must_use]
     pub fn deviation(start: &QuadNet, moved: &QuadNet) -> f64 {
         assert_eq!(start.quads(), moved.quads(), "one net before and after");
-        let (targets, curves) = targets(start, Boundary::Glide);
+        let targets = Targets::new(start, Boundary::Glide);
         let far = |v: usize| {
             let p = moved.positions()[v];
-            match &targets[v] {
+            match &targets.of_vertices[v] {
                 Target::Surface => 0.0,
                 Target::Anchor(at) => at.distance(p),
-                Target::Curve(k) => closest_on_polyline(&curves[*k], p).point.distance(p),
+                Target::Curve(k) => closest_on_polyline(&targets.curves[*k], p).point.distance(p),
             }
         };
         (0..moved.positions().len()).map(far).fold(0.0, f64::max)
@@ -108,34 +84,3 @@ impl BoundaryPolygon {
 
 /// Sine of the angle between edges that count as one straight line.
 const STRAIGHT: f64 = 1e-9;
-
-/// The target of every vertex, and the boundary curves that targets name.
-pub(crate) fn targets(
-    net: &QuadNet,
-    boundary: Boundary,
-) -> (Vec<Target>, Vec<Vec<geom_core::DVec3>>) {
-    let mut curves = Vec::new();
-    let mut curve_of = vec![0; net.positions().len()];
-    if boundary == Boundary::Glide {
-        for walk in net.mesh().boundary_loops() {
-            let ids: Vec<usize> = walk.iter().map(|&h| net.mesh().origin(h).index()).collect();
-            for &v in &ids {
-                curve_of[v] = curves.len();
-            }
-            let closed = ids.iter().chain(&ids[..1]);
-            curves.push(closed.map(|&v| net.positions()[v]).collect());
-        }
-    }
-    let target = |v: usize| {
-        let start = net.positions()[v];
-        let corner = || net.mesh().valence(VertexId(v as u32)) == 2;
-        match boundary {
-            _ if !net.boundary()[v] => Target::Surface,
-            Boundary::Free => Target::Surface,
-            Boundary::Anchored | Boundary::Fixed => Target::Anchor(start),
-            Boundary::Glide if corner() => Target::Anchor(start),
-            Boundary::Glide => Target::Curve(curve_of[v]),
-        }
-    };
-    ((0..net.positions().len()).map(target).collect(), curves)
-}

@@ -1,41 +1,16 @@
 //! Darboux transformations: hyperbolic nets to smooth surfaces of Darboux cyclide patches.
 
-use crate::{BilinearPatch, Quadric};
+use super::error::{CageFault, Error};
+use crate::net::{BilinearPatch, Quadric};
 use geom_core::{DMat3, DVec3};
 use glam::DMat4;
+use gp_solver::choices;
 use numerics::{dot, norm};
-
-/// Why a point or a net cannot be transformed.
-#[derive(Clone, Debug, PartialEq, thiserror::Error)]
-#[non_exhaustive]
-#[expect(missing_docs, reason = "the messages spell out every field")]
-pub enum DarbouxError {
-    /// The centre lies on the hyperplane it projects from.
-    #[error("c = {c} is no Darboux transformation; choose c finite and different from 1")]
-    BadCentre { c: f64 },
-    /// No real image.
-    #[error(
-        "({x}, {y}, {z}) has no real image (discriminant {discriminant:e}); it lies outside the real domain: choose |c| ≤ 1, a larger |c|, or a gentler cage"
-    )]
-    OutsideRealDomain { x: f64, y: f64, z: f64, discriminant: f64 },
-    /// The image lies at infinity, or on its other side.
-    #[error(
-        "the image passes through infinity at ({x}, {y}, {z}); choose the other branch or move the net"
-    )]
-    Infinite { x: f64, y: f64, z: f64 },
-    /// All points have the same image.
-    #[error("this branch maps every point to one point; choose the other branch")]
-    Collapsed,
-    /// A map that is not one to one.
-    #[error("the cage has no transformation: {why}; move its corners nearer to a box")]
-    BadCage { why: String },
-    /// A patch at fault.
-    #[error(transparent)]
-    Patch(#[from] crate::PatchError),
-}
+use serde::{Deserialize, Serialize};
 
 /// Which of the two images of a point.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
 pub enum Branch {
     /// For `c` alone the one that is regular at the origin; for a cage the one through its corners.
     #[default]
@@ -43,6 +18,8 @@ pub enum Branch {
     /// The other one: inverse to it in the sphere Λ.
     Other,
 }
+
+choices!(Branch { Regular = "regular", Other = "other" });
 
 /// A transformation given by its rational inverse `X ~ N (y, |y|², 1)`, `N` a 4 × 5 matrix.
 ///
@@ -99,10 +76,10 @@ impl DarbouxMap {
     /// `|x|² ≤ (c − 1)/(c + 1)` for `|c| > 1`, and all are real for `|c| ≤ 1`.
     ///
     /// # Errors
-    /// [`DarbouxError::BadCentre`] for `c = 1` and what is not finite.
-    pub fn new(c: f64) -> Result<Self, DarbouxError> {
+    /// [`Error::BadCentre`] for `c = 1` and what is not finite.
+    pub fn new(c: f64) -> Result<Self, Error> {
         if !c.is_finite() || c == 1.0 {
-            return Err(DarbouxError::BadCentre { c });
+            return Err(Error::BadCentre { c });
         }
         let mut n = [[0.0; 5]; 4];
         for i in 0..3 {
@@ -121,12 +98,11 @@ impl DarbouxMap {
     /// otherwise.
     ///
     /// # Errors
-    /// [`DarbouxError::BadCage`] if `N` has not rank 4.
-    pub fn from_matrix(n: [[f64; 5]; 4]) -> Result<Self, DarbouxError> {
-        let bad = |why: &str| DarbouxError::BadCage { why: why.to_owned() };
+    /// [`Error::BadCage`] if `N` has not rank 4.
+    pub fn from_matrix(n: [[f64; 5]; 4]) -> Result<Self, Error> {
         let size = n.iter().flatten().fold(0.0_f64, |m, v| m.max(v.abs()));
         if !(size > 0.0 && size.is_finite()) {
-            return Err(bad("its matrix is zero or not finite"));
+            return Err(CageFault::NoMatrix.into());
         }
         let n = n.map(|row| row.map(|v| v / size));
         // The kernel is the vector of signed 4 × 4 minors.
@@ -140,7 +116,7 @@ impl DarbouxMap {
         });
         let length = norm(&kernel);
         if !(length > 1e-14) {
-            return Err(bad("it maps space to a plane"));
+            return Err(CageFault::Flattens.into());
         }
         let kernel = kernel.map(|v| v / length);
         let mut gram = [[0.0; 4]; 4];
@@ -151,7 +127,7 @@ impl DarbouxMap {
         }
         let inverse = DMat4::from_cols_array_2d(&gram).inverse();
         if !inverse.is_finite() {
-            return Err(bad("it maps space to a plane"));
+            return Err(CageFault::Flattens.into());
         }
         let inverse = inverse.to_cols_array_2d();
         let pseudo_inverse = std::array::from_fn(|k| {
@@ -165,7 +141,7 @@ impl DarbouxMap {
     ///
     /// # Errors
     /// As [`Self::from_matrix`].
-    pub fn in_frame(&self, origin: DVec3, unit: f64) -> Result<Self, DarbouxError> {
+    pub fn in_frame(&self, origin: DVec3, unit: f64) -> Result<Self, Error> {
         // y' = (y − o)/u lifts linearly: |y'|² = (|y|² − 2 o·y + |o|²)/u².
         let o = origin.to_array();
         let mut lift = [[0.0; 5]; 5];
@@ -200,8 +176,8 @@ impl DarbouxMap {
     /// The same map with `Regular` the branch on which the pairs `x → y` lie.
     ///
     /// # Errors
-    /// [`DarbouxError::BadCage`] if they lie on both.
-    pub fn through(mut self, pairs: &[(DVec3, DVec3)]) -> Result<Self, DarbouxError> {
+    /// [`Error::BadCage`] if they lie on both.
+    pub fn through(mut self, pairs: &[(DVec3, DVec3)]) -> Result<Self, Error> {
         let mut votes = [Vec::new(), Vec::new()];
         for (k, &(x, y)) in pairs.iter().enumerate() {
             // A branch without an image here is no candidate.
@@ -211,14 +187,12 @@ impl DarbouxMap {
             };
             let (plus, minus) = (far(1.0), far(-1.0));
             if plus.min(minus) == f64::INFINITY {
-                let why = format!("corner {k} has no real image");
-                return Err(DarbouxError::BadCage { why });
+                return Err(CageFault::NoRealImage { corner: k }.into());
             }
             votes[usize::from(minus < plus)].push(k);
         }
         if let ([a, ..], [b, ..]) = (votes[0].as_slice(), votes[1].as_slice()) {
-            let why = format!("corners {a} and {b} lie on different branches");
-            return Err(DarbouxError::BadCage { why });
+            return Err(CageFault::DifferentBranches { corners: [*a, *b] }.into());
         }
         self.regular = if votes[0].is_empty() { -1.0 } else { 1.0 };
         Ok(self)
@@ -233,10 +207,10 @@ impl DarbouxMap {
     /// The image of a point.
     ///
     /// # Errors
-    /// [`DarbouxError`] outside the real domain, at infinity, or on a branch that collapses.
-    pub fn image(&self, x: DVec3, branch: Branch) -> Result<DVec3, DarbouxError> {
+    /// [`Error`] outside the real domain, at infinity, or on a branch that collapses.
+    pub fn image(&self, x: DVec3, branch: Branch) -> Result<DVec3, Error> {
         let lifted = self.lift(x, self.sign(branch))?;
-        project(&lifted).ok_or(DarbouxError::Infinite { x: x.x, y: x.y, z: x.z })
+        project(&lifted).ok_or(Error::Infinite { x: x.x, y: x.y, z: x.z })
     }
 
     /// The point with a given image; rational and single-valued. `None` at infinity.
@@ -252,7 +226,7 @@ impl DarbouxMap {
     ///
     /// # Errors
     /// As [`Self::image`]; the derivative does not exist on the border of the real domain.
-    pub fn derivative(&self, x: DVec3, branch: Branch) -> Result<(DVec3, DMat3), DarbouxError> {
+    pub fn derivative(&self, x: DVec3, branch: Branch) -> Result<(DVec3, DMat3), Error> {
         let y = self.image(x, branch)?;
         let lifted = lifted(y);
         let bottom = dot(&self.n[3], &lifted);
@@ -264,7 +238,7 @@ impl DarbouxMap {
         let backward = DMat3::from_cols(column(0), column(1), column(2));
         let forward = backward.inverse();
         if !(bottom.abs() > 1e-14 * norm(&lifted)) || !forward.is_finite() {
-            return Err(DarbouxError::Collapsed);
+            return Err(Error::Collapsed);
         }
         Ok((y, forward))
     }
@@ -275,8 +249,8 @@ impl DarbouxMap {
     /// For `c` alone the real domain is a ball, so corners decide for the patches between them.
     ///
     /// # Errors
-    /// [`DarbouxError`] names the first point at fault.
-    pub fn check(&self, points: &[DVec3], branch: Branch) -> Result<(), DarbouxError> {
+    /// [`Error`] names the first point at fault.
+    pub fn check(&self, points: &[DVec3], branch: Branch) -> Result<(), Error> {
         let mut side = 0.0_f64;
         for &p in points {
             let lifted = self.lift(p, self.sign(branch))?;
@@ -284,7 +258,7 @@ impl DarbouxMap {
             let scale = dot(&self.n[3], &lifted);
             let here = (lifted[4] / scale).signum();
             if project(&lifted).is_none() || (side != 0.0 && here != side) {
-                return Err(DarbouxError::Infinite { x: p.x, y: p.y, z: p.z });
+                return Err(Error::Infinite { x: p.x, y: p.y, z: p.z });
             }
             side = here;
         }
@@ -356,7 +330,7 @@ impl DarbouxMap {
     }
 
     /// The point `(y, m, s)` with `|y|² = m s` and `N (y, m, s) ~ (x, 1)`, of one root.
-    fn lift(&self, x: DVec3, sign: f64) -> Result<[f64; 5], DarbouxError> {
+    fn lift(&self, x: DVec3, sign: f64) -> Result<[f64; 5], Error> {
         let target = [x.x, x.y, x.z, 1.0];
         let start: [f64; 5] =
             std::array::from_fn(|k| (0..4).map(|i| self.pseudo_inverse[k][i] * target[i]).sum());
@@ -367,14 +341,14 @@ impl DarbouxMap {
             (form(&self.kernel, &self.kernel), form(&self.kernel, &start), form(&start, &start));
         let discriminant = b * b - a * c;
         if !(discriminant >= 0.0) {
-            return Err(DarbouxError::OutsideRealDomain { x: x.x, y: x.y, z: x.z, discriminant });
+            return Err(Error::OutsideRealDomain { x: x.x, y: x.y, z: x.z, discriminant });
         }
         let root = discriminant.sqrt();
         // (t : τ) = (−b ± root : a) = (c : −b ∓ root); the form whose sum does not cancel.
         let (t, tau) = if b * sign <= 0.0 { (-b + sign * root, a) } else { (c, -b - sign * root) };
         let lifted: [f64; 5] = std::array::from_fn(|k| tau * start[k] + t * self.kernel[k]);
         if !(tau.abs() > 1e-14 * (t.abs() + tau.abs())) {
-            return Err(DarbouxError::Collapsed);
+            return Err(Error::Collapsed);
         }
         Ok(lifted)
     }
@@ -440,5 +414,5 @@ fn parallel(a: &[f64; 5], b: &[f64; 5]) -> bool {
 }
 
 #[cfg(test)]
-#[path = "darboux_tests.rs"]
+#[path = "map_tests.rs"]
 mod tests;

@@ -1,6 +1,7 @@
 //! Quad nets with their two families of edges, as the solvers need them.
 
-use crate::{EdgeJoin, NetError};
+use super::join::EdgeJoin;
+use crate::Error;
 use geom_core::{DVec3, FaceId, PolyMesh, VertexId};
 
 /// One of the two families of asymptotic curves.
@@ -58,10 +59,10 @@ impl QuadNet {
     /// others keep their order; faces keep their order and orientation.
     ///
     /// # Errors
-    /// [`NetError`] for faces that are not quads, odd interior valences, families that swap.
-    pub fn new(mesh: &PolyMesh) -> Result<Self, NetError> {
+    /// [`Error`] for faces that are not quads, odd interior valences, families that swap.
+    pub fn new(mesh: &PolyMesh) -> Result<Self, Error> {
         if let Some(f) = mesh.faces().find(|&f| mesh.face_degree(f) != 4) {
-            return Err(NetError::NotQuad { face: f.index(), corners: mesh.face_degree(f) });
+            return Err(Error::NotQuad { face: f.index(), corners: mesh.face_degree(f) });
         }
         check_valences(mesh)?;
         let turned = turned_faces(mesh)?;
@@ -270,7 +271,7 @@ impl QuadNet {
     }
 }
 
-fn check_valences(mesh: &PolyMesh) -> Result<(), NetError> {
+fn check_valences(mesh: &PolyMesh) -> Result<(), Error> {
     let odd = |v: &VertexId| {
         mesh.outgoing(*v).is_some() && !mesh.is_boundary_vertex(*v) && mesh.valence(*v) % 2 == 1
     };
@@ -278,24 +279,24 @@ fn check_valences(mesh: &PolyMesh) -> Result<(), NetError> {
     match vertices.first() {
         Some(&v) => {
             let valence = mesh.valence(VertexId(v as u32));
-            Err(NetError::OddValence { vertices, valence })
+            Err(Error::OddValence { vertices, valence })
         }
         None => Ok(()),
     }
 }
 
-fn check_edges(mesh: &PolyMesh) -> Result<(), NetError> {
+fn check_edges(mesh: &PolyMesh) -> Result<(), Error> {
     for h in mesh.edges() {
         let (from, to) = (mesh.origin(h), mesh.target(h));
         if mesh.position(from) == mesh.position(to) {
-            return Err(NetError::ZeroEdge { from: from.index(), to: to.index() });
+            return Err(Error::ZeroEdge { from: from.index(), to: to.index() });
         }
     }
     Ok(())
 }
 
 /// For every face whether its edge 0–1 belongs to the second family, so that corners must turn.
-fn turned_faces(mesh: &PolyMesh) -> Result<Vec<bool>, NetError> {
+fn turned_faces(mesh: &PolyMesh) -> Result<Vec<bool>, Error> {
     let mut turned: Vec<Option<bool>> = vec![None; mesh.face_count()];
     let local = |h: geom_core::HalfEdgeId, f: FaceId| h.index() - mesh.face_half_edge(f).index();
     for start in mesh.faces() {
@@ -318,7 +319,7 @@ fn turned_faces(mesh: &PolyMesh) -> Result<Vec<bool>, NetError> {
                     }
                     Some(have) if have != want => {
                         let (from, to) = (mesh.origin(h).index(), mesh.target(h).index());
-                        return Err(NetError::FamiliesSwap { from, to });
+                        return Err(Error::FamiliesSwap { from, to });
                     }
                     Some(_) => {}
                 }
@@ -412,7 +413,7 @@ mod tests {
     fn unusable_meshes_are_refused_with_the_remedy() {
         let triangle = PolyMesh::new(vec![DVec3::ZERO, DVec3::X, DVec3::Y], &[[0, 1, 2]]).unwrap();
         let error = QuadNet::new(&triangle).unwrap_err();
-        assert_eq!(error, NetError::NotQuad { face: 0, corners: 3 });
+        assert_eq!(error, Error::NotQuad { face: 0, corners: 3 });
         assert!(error.to_string().contains("remesh"));
         // Three quads around a vertex.
         let ring = |k: usize, r: f64| {
@@ -423,7 +424,7 @@ mod tests {
         points.extend((0..6).map(|k| ring(k, 1.0)));
         let odd = PolyMesh::new(points, &[[0, 1, 2, 3], [0, 3, 4, 5], [0, 5, 6, 1]]).unwrap();
         let error = QuadNet::new(&odd).unwrap_err();
-        assert_eq!(error, NetError::OddValence { vertices: vec![0], valence: 3 });
+        assert_eq!(error, Error::OddValence { vertices: vec![0], valence: 3 });
         // The three quadrants at the corner of a box, without their faces at the corner itself:
         // a ring around a vertex that would have valence 3.
         let axes = [DVec3::X, DVec3::Y, DVec3::Z];
@@ -445,11 +446,11 @@ mod tests {
             }
         }
         let error = QuadNet::new(&PolyMesh::new(points, &quads).unwrap()).unwrap_err();
-        assert!(matches!(error, NetError::FamiliesSwap { .. }), "{error}");
+        assert!(matches!(error, Error::FamiliesSwap { .. }), "{error}");
         let mut same = asymptotic_nets::helicoid();
         same.positions[1] = same.positions[0];
         let mesh = PolyMesh::new(same.positions, &same.quads).unwrap();
-        assert!(matches!(QuadNet::new(&mesh), Err(NetError::ZeroEdge { .. })));
+        assert!(matches!(QuadNet::new(&mesh), Err(Error::ZeroEdge { .. })));
     }
 
     #[test]

@@ -1,19 +1,26 @@
 //! Free-form deformation by a cage: a box whose corners are moved determines the transformation.
 
-use crate::darboux::{DarbouxError, DarbouxMap};
+use super::error::{CageFault, Error};
+use super::map::{Branch, DarbouxMap};
 use geom_core::{BoundingBox, DVec3};
+use gp_solver::choices;
 use numerics::right_singular_vectors;
+use serde::{Deserialize, Serialize};
 
 /// How much freedom the transformation has.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Freedom {
     /// A projective map and `c`, 16 degrees of freedom, as published: Λ stays centred at the
     /// middle of the box.
+    #[serde(rename = "16")]
     Sixteen,
     /// The general matrix `N`, 19 degrees of freedom: the image may also be translated.
     #[default]
+    #[serde(rename = "19")]
     Nineteen,
 }
+
+choices!(Freedom { Sixteen = "16", Nineteen = "19" });
 
 /// A fitted transformation.
 #[derive(Clone, Debug, PartialEq)]
@@ -49,23 +56,22 @@ pub fn cage_corners(bounds: BoundingBox, margin: f64) -> [DVec3; 8] {
 /// them approximately: [`CageFit::errors`] says how well.
 ///
 /// # Errors
-/// [`DarbouxError::BadCage`] if the corners span no volume, have no common transformation, or
+/// [`Error::BadCage`] if the corners span no volume, have no common transformation, or
 /// would be images of different branches.
 pub fn fit_cage(
     corners: &[DVec3; 8],
     images: &[DVec3; 8],
     freedom: Freedom,
-) -> Result<CageFit, DarbouxError> {
-    let bad = |why: &str| DarbouxError::BadCage { why: why.to_owned() };
+) -> Result<CageFit, Error> {
     if !corners.iter().chain(images).all(|p| p.is_finite()) {
-        return Err(bad("a corner is not finite"));
+        return Err(CageFault::NotFinite.into());
     }
     let centre = corners.iter().sum::<DVec3>() / 8.0;
     let unit = corners.iter().map(|x| x.distance(centre)).fold(0.0, f64::max) * 2.0;
     let volume =
         (corners[1] - corners[0]).cross(corners[2] - corners[0]).dot(corners[4] - corners[0]).abs();
     if !(volume > 1e-9 * unit.powi(3)) {
-        return Err(bad("its box has no volume"));
+        return Err(CageFault::NoVolume.into());
     }
     // In lengths of the box's diagonal about its middle all entries of N have like sizes.
     let shrink = |p: &DVec3| (*p - centre) / unit;
@@ -83,7 +89,7 @@ pub fn fit_cage(
     let map = map.through(&world)?;
     let mut errors = [0.0; 8];
     for (k, (x, y)) in world.iter().enumerate() {
-        errors[k] = map.image(*x, crate::Branch::Regular)?.distance(*y);
+        errors[k] = map.image(*x, Branch::Regular)?.distance(*y);
     }
     Ok(CageFit { map, c, errors })
 }
@@ -197,7 +203,6 @@ fn best_centre(pairs: &[(DVec3, DVec3)]) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::Branch;
 
     fn corners() -> [DVec3; 8] {
         let bounds =

@@ -1,9 +1,14 @@
 //! A whole net under a Darboux transformation: points, exact normals, curvatures and kinks.
 
-use crate::darboux::{Branch, DarbouxError, DarbouxMap};
-use crate::{HyperbolicNet, KINK_SAMPLES, SampledPatches, SurfaceSample};
+use super::error::Error;
+use super::map::{Branch, DarbouxMap};
+use crate::net::{BilinearPatch, HyperbolicNet, KINK_SAMPLES, SampledPatches, SurfaceSample};
 use geom_core::DVec3;
+use gp_solver::{Observer, Status};
 use rayon::prelude::*;
+
+/// Patches sampled between two questions whether to stop.
+const AT_ONCE: usize = 256;
 
 /// The image of a hyperbolic net: a smooth surface of Darboux cyclide patches.
 ///
@@ -19,12 +24,12 @@ impl<'a> TransformedNet<'a> {
     /// Checks that the whole net has an image.
     ///
     /// # Errors
-    /// [`DarbouxError`] names the first vertex without one.
+    /// [`Error`] names the first vertex without one.
     pub fn new(
         surface: &'a HyperbolicNet,
         map: &'a DarbouxMap,
         branch: Branch,
-    ) -> Result<Self, DarbouxError> {
+    ) -> Result<Self, Error> {
         map.check(surface.net().positions(), branch)?;
         Ok(Self { surface, map, branch })
     }
@@ -33,7 +38,7 @@ impl<'a> TransformedNet<'a> {
     ///
     /// # Errors
     /// As [`DarbouxMap::image`].
-    pub fn positions(&self) -> Result<Vec<DVec3>, DarbouxError> {
+    pub fn positions(&self) -> Result<Vec<DVec3>, Error> {
         self.surface.net().positions().iter().map(|p| self.map.image(*p, self.branch)).collect()
     }
 
@@ -42,51 +47,77 @@ impl<'a> TransformedNet<'a> {
     ///
     /// # Errors
     /// As [`DarbouxMap::derivative`].
-    pub fn sample(&self, cells: usize) -> Result<SampledPatches, DarbouxError> {
+    pub fn sample(&self, cells: usize) -> Result<SampledPatches, Error> {
+        let sampled = self.sample_observed(cells, &mut ())?;
+        Ok(sampled.unwrap_or(SampledPatches { samples: Vec::new(), cells }))
+    }
+
+    /// As [`Self::sample`]; `None` once the observer, asked every few patches, wants to stop.
+    fn sample_observed(
+        &self,
+        cells: usize,
+        observer: &mut dyn Observer,
+    ) -> Result<Option<SampledPatches>, Error> {
         let patches = self.surface.patches()?;
         let per_patch = (cells + 1) * (cells + 1);
         let at = |k: usize| k as f64 / cells as f64;
-        let grids: Vec<Result<Vec<SurfaceSample>, DarbouxError>> = patches
-            .par_iter()
-            .map(|patch| {
-                let cyclide = self.map.cyclide(patch);
-                (0..per_patch)
-                    .map(|k| {
-                        let jet = patch.jet(at(k / (cells + 1)), at(k % (cells + 1)));
-                        let (point, forward) = self.map.derivative(jet.point, self.branch)?;
-                        let normal = (forward * jet.du).cross(forward * jet.dv).normalize_or_zero();
-                        let (mean, gaussian_curvature) = cyclide.curvatures(point);
-                        // The implicit equation may have its normal on the other side.
-                        let side = cyclide.gradient(point).dot(normal).signum();
-                        let mean_curvature = mean * side;
-                        Ok(SurfaceSample { point, normal, mean_curvature, gaussian_curvature })
-                    })
-                    .collect()
-            })
-            .collect();
+        let grid = |patch: &BilinearPatch| -> Result<Vec<SurfaceSample>, Error> {
+            let cyclide = self.map.cyclide(patch);
+            (0..per_patch)
+                .map(|k| {
+                    let jet = patch.jet(at(k / (cells + 1)), at(k % (cells + 1)));
+                    let (point, forward) = self.map.derivative(jet.point, self.branch)?;
+                    let normal = (forward * jet.du).cross(forward * jet.dv).normalize_or_zero();
+                    let (mean, gaussian_curvature) = cyclide.curvatures(point);
+                    // The implicit equation may have its normal on the other side.
+                    let side = cyclide.gradient(point).dot(normal).signum();
+                    let mean_curvature = mean * side;
+                    Ok(SurfaceSample { point, normal, mean_curvature, gaussian_curvature })
+                })
+                .collect()
+        };
         let mut samples = Vec::with_capacity(patches.len() * per_patch);
-        for grid in grids {
-            samples.extend(grid?);
+        for chunk in patches.chunks(AT_ONCE) {
+            if observer.stop_requested() {
+                return Ok(None);
+            }
+            let grids: Vec<Result<Vec<SurfaceSample>, Error>> =
+                chunk.par_iter().map(grid).collect();
+            for grid in grids {
+                samples.extend(grid?);
+            }
         }
-        Ok(SampledPatches { samples, cells })
+        Ok(Some(SampledPatches { samples, cells }))
     }
 
     /// The coarsest sampling, out of those with up to 32 cells, whose cells are nowhere farther
     /// than `accuracy` (in model units) from the surface, and the distance it has: measured
     /// between the mean of the corners of every cell and the surface's point at its middle, half
-    /// of which a triangulation misses at most.
+    /// of which a triangulation misses at most. [`Status::Interrupted`] with what there is once the
+    /// observer wants to stop.
     ///
     /// # Errors
     /// As [`Self::sample`].
-    pub fn sample_within(&self, accuracy: f64) -> Result<(SampledPatches, f64), DarbouxError> {
+    pub fn sample_within(
+        &self,
+        accuracy: f64,
+        observer: &mut dyn Observer,
+    ) -> Result<(SampledPatches, f64, Status), Error> {
         let mut cells = 2;
+        let mut last = (SampledPatches { samples: Vec::new(), cells }, f64::INFINITY);
         loop {
             // Every second point of the finer grid is the coarse one, the others test it.
-            let fine = self.sample(2 * cells)?;
+            let Some(fine) = self.sample_observed(2 * cells, observer)? else {
+                return Ok((last.0, last.1, Status::Interrupted));
+            };
             let (coarse, error) = halve(&fine);
-            if error <= accuracy || cells >= 32 {
-                return Ok((coarse, error));
+            if error <= accuracy {
+                return Ok((coarse, error, Status::Converged));
             }
+            if cells >= 32 {
+                return Ok((coarse, error, Status::IterationLimit));
+            }
+            last = (coarse, error);
             cells *= 2;
         }
     }
@@ -96,7 +127,7 @@ impl<'a> TransformedNet<'a> {
     ///
     /// # Errors
     /// As [`DarbouxMap::derivative`].
-    pub fn kinks(&self) -> Result<Vec<f64>, DarbouxError> {
+    pub fn kinks(&self) -> Result<Vec<f64>, Error> {
         let net = self.surface.net();
         net.inner_edges()
             .par_iter()
@@ -152,13 +183,13 @@ pub fn image_of_segment(
     branch: Branch,
     ends: [DVec3; 2],
     points: usize,
-) -> Result<Vec<DVec3>, DarbouxError> {
+) -> Result<Vec<DVec3>, Error> {
     (0..=points)
         .map(|k| map.image(ends[0].lerp(ends[1], k as f64 / points as f64), branch))
         .collect()
 }
 
-/// The twelve edges of a box with corners as [`crate::cage_corners`] numbers them.
+/// The twelve edges of a box with corners as [`super::cage_corners`] numbers them.
 pub const CAGE_EDGES: [[usize; 2]; 12] = [
     [0, 1],
     [2, 3],
@@ -174,7 +205,7 @@ pub const CAGE_EDGES: [[usize; 2]; 12] = [
     [3, 7],
 ];
 
-/// Straight lines within the faces of a box with corners as [`crate::cage_corners`] numbers them,
+/// Straight lines within the faces of a box with corners as [`super::cage_corners`] numbers them,
 /// `count` in each direction of each face: their images are circles on the spheres that the faces
 /// become.
 #[must_use]
@@ -197,24 +228,24 @@ pub fn cage_face_lines(corners: &[DVec3; 8], count: usize) -> Vec<[DVec3; 2]> {
 
 #[cfg(test)]
 mod tests {
+    use super::super::cage::cage_corners;
     use super::*;
-    use crate::{JointOptions, QuadNet, solve_joint};
+    use crate::{Input, Options, QuadNet, solve};
     use fixtures::asymptotic_nets;
     use geom_core::{BoundingBox, PolyMesh};
-    use std::ops::ControlFlow;
 
     fn solved() -> HyperbolicNet {
         let model = asymptotic_nets::catenoid(20, 14);
         let mesh = PolyMesh::new(model.positions.clone(), &model.quads).unwrap();
         let net = QuadNet::new(&mesh).unwrap();
-        let go_on = |_: &_| ControlFlow::Continue(());
-        solve_joint(&net, &*model.surface, &JointOptions::default(), go_on).unwrap().0
+        let input = Input::near_surface(&net, &*model.surface);
+        solve(&input, &Options::default(), &mut ()).unwrap().result
     }
 
     #[test]
     fn lines_of_the_cage_lie_in_its_faces() {
         let bounds = BoundingBox { min: DVec3::ZERO, max: DVec3::new(1.0, 2.0, 3.0) };
-        let lines = cage_face_lines(&crate::cage_corners(bounds, 0.0), 2);
+        let lines = cage_face_lines(&cage_corners(bounds, 0.0), 2);
         assert_eq!(lines.len(), 24);
         for [a, b] in lines {
             let (a, b) = ((a / bounds.max).to_array(), (b / bounds.max).to_array());
@@ -256,7 +287,8 @@ mod tests {
         let map = DarbouxMap::new(-0.6).unwrap();
         let map = map.in_frame(bounds.center(), bounds.diagonal()).unwrap();
         let image = TransformedNet::new(&surface, &map, Branch::Regular).unwrap();
-        let (sampled, error) = image.sample_within(1e-4).unwrap();
+        let (sampled, error, status) = image.sample_within(1e-4, &mut ()).unwrap();
+        assert_eq!(status, Status::Converged);
         assert!(error <= 1e-4 && sampled.cells < 32, "{error} with {}", sampled.cells);
         assert_eq!(sampled.samples.len(), 240 * (sampled.cells + 1).pow(2));
     }

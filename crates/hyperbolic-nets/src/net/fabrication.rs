@@ -1,6 +1,8 @@
 //! Patches as panels: rulings for hot-wire cut molds, and how many different panels there are.
 
-use crate::{BilinearPatch, HyperbolicNet, PatchError};
+use super::hyperbolic_net::HyperbolicNet;
+use super::patch::BilinearPatch;
+use crate::PatchError;
 use bspline::{BsplineSurface, Degree, KnotVector, SplineError};
 use geom_core::DVec3;
 

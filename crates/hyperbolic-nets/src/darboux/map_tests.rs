@@ -165,20 +165,20 @@ fn frames_shift_and_scale_model_and_image_alike() {
 #[test]
 fn what_has_no_image_is_named() {
     for c in [1.0, f64::NAN, f64::INFINITY] {
-        assert!(matches!(DarbouxMap::new(c), Err(DarbouxError::BadCentre { .. })));
+        assert!(matches!(DarbouxMap::new(c), Err(Error::BadCentre { .. })));
     }
     let map = DarbouxMap::new(3.0).unwrap();
     let outside = DVec3::new(0.8, 0.0, 0.0);
     let error = map.check(&[DVec3::ZERO, outside], Branch::Regular).unwrap_err();
-    assert!(matches!(error, DarbouxError::OutsideRealDomain { x: 0.8, .. }), "{error}");
+    assert!(matches!(error, Error::OutsideRealDomain { x: 0.8, .. }), "{error}");
     let error = map.image(DVec3::ZERO, Branch::Other).unwrap_err();
-    assert!(matches!(error, DarbouxError::Infinite { .. }), "{error}");
+    assert!(matches!(error, Error::Infinite { .. }), "{error}");
     // c = −1 is an inversion on one branch, and collapses on the other.
     let map = DarbouxMap::new(-1.0).unwrap();
     let x = DVec3::new(0.3, 0.2, 0.1);
     let images = [Branch::Regular, Branch::Other].map(|b| map.image(x, b));
-    assert!(images.contains(&Err(DarbouxError::Collapsed)), "{images:?}");
+    assert!(images.contains(&Err(Error::Collapsed)), "{images:?}");
     let inverted = x * (4.0 / x.length_squared());
     assert!(images.iter().flatten().any(|y| y.distance(inverted) < 1e-12), "{images:?}");
-    assert!(matches!(DarbouxMap::from_matrix([[0.0; 5]; 4]), Err(DarbouxError::BadCage { .. })));
+    assert!(matches!(DarbouxMap::from_matrix([[0.0; 5]; 4]), Err(Error::BadCage { .. })));
 }
