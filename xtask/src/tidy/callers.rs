@@ -23,13 +23,8 @@ const KEPT: &[(&str, &str)] = &[
 ];
 
 /// Items whose callers in the methods are on their way; this list may only become shorter.
-const EXPECTED: &[&str] = &[
-    "BandCholesky",
-    "MultifrontalCholesky",
-    "QpSolution",
-    "Regularization",
-    "solve_observed",
-];
+const EXPECTED: &[&str] =
+    &["BandCholesky", "MultifrontalCholesky", "QpSolution", "Regularization", "solve_observed"];
 
 /// Looks for the names of gp-solver's front page in all other crates.
 pub(crate) fn check(faults: &mut Vec<String>) -> Outcome {
