@@ -130,7 +130,7 @@ impl Observer for Stop {
 
 #[test]
 fn a_request_to_stop_is_heeded_anywhere_within_a_second() {
-    let input = Input::from(quad_graphs::ellipsoid(8, DVec3::new(1.0, 1.3, 1.7)));
+    let input = Input::from(quad_graphs::ellipsoid(5, DVec3::new(1.0, 1.3, 1.7)));
     let options = Options { levels: 1, iterations: 6, ..Options::default() };
     let mut whole = Stop { left: usize::MAX, asked: 0, since: None };
     solve(&input, &options, &mut whole).expect("an ellipsoid");
