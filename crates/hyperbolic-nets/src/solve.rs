@@ -43,12 +43,12 @@ pub struct Solution {
 /// ```
 /// use geom_core::{DVec3, PolyMesh};
 /// use hyperbolic_nets::{Input, Options, QuadNet, solve};
-/// // Sixteen quads near the rulings of z = xy.
-/// let at = |k: u32| f64::from(k) / 4.0 - 0.5;
-/// let points = (0..25).map(|k| (at(k / 5), at(k % 5)));
-/// let points = points.map(|(x, y)| DVec3::new(x, y, x * y + 0.01 * (9.0 * x).sin())).collect();
-/// let corner = |k: u32| [k, k + 5, k + 6, k + 1];
-/// let quads: Vec<[u32; 4]> = (0..19).filter(|k| k % 5 < 4).map(corner).collect();
+/// // Sixty-four quads near the rulings of z = xy.
+/// let at = |k: u32| f64::from(k) / 8.0 - 0.5;
+/// let points = (0..81).map(|k| (at(k / 9), at(k % 9)));
+/// let points = points.map(|(x, y)| DVec3::new(x, y, x * y + 0.003 * (9.0 * x).sin())).collect();
+/// let corner = |k: u32| [k, k + 9, k + 10, k + 1];
+/// let quads: Vec<[u32; 4]> = (0..71).filter(|k| k % 9 < 8).map(corner).collect();
 /// let net = QuadNet::new(&PolyMesh::new(points, &quads)?)?;
 /// let solution = solve(&Input::new(&net), &Options::default(), &mut ())?;
 /// assert!(solution.metrics.kink_max_deg < 1e-9);

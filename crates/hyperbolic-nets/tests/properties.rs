@@ -2,7 +2,7 @@
 #![allow(clippy::unwrap_used, reason = "a test may panic")]
 
 use fixtures::asymptotic_nets;
-use geom_core::{DMat3, DVec3, PolyMesh};
+use geom_core::{ClosestPoint, DMat3, DVec3, Foot, PolyMesh};
 use gp_solver::{List, OptionValue};
 use hyperbolic_nets::darboux::{Branch, Corner, DarbouxMap, ImageCircle};
 use hyperbolic_nets::{
@@ -23,6 +23,23 @@ impl Similarity {
     fn of(self, p: DVec3) -> DVec3 {
         self.turn * p * self.scale + self.shift
     }
+
+    fn back(self, p: DVec3) -> DVec3 {
+        self.turn.transpose() * (p - self.shift) / self.scale
+    }
+}
+
+/// A surface somewhere else.
+struct Moved<'a> {
+    surface: &'a dyn ClosestPoint,
+    by: Similarity,
+}
+
+impl ClosestPoint for Moved<'_> {
+    fn closest_point(&self, x: DVec3) -> Foot {
+        let foot = self.surface.closest_point(self.by.back(x));
+        Foot { point: self.by.of(foot.point), normal: self.by.turn * foot.normal }
+    }
 }
 
 fn vector(size: f64) -> impl Strategy<Value = DVec3> {
@@ -42,11 +59,11 @@ fn jittered(seed: u64) -> (Vec<DVec3>, Vec<[u32; 4]>) {
     (model.positions, model.quads)
 }
 
-/// Positions and shape parameters of the hyperbolic net.
-fn solved(positions: Vec<DVec3>, quads: &[[u32; 4]]) -> (Vec<DVec3>, Vec<f64>) {
+/// Positions of the hyperbolic net.
+fn solved(positions: Vec<DVec3>, quads: &[[u32; 4]]) -> Vec<DVec3> {
     let net = QuadNet::new(&PolyMesh::new(positions, quads).unwrap()).unwrap();
     let result = solve(&Input::new(&net), &Options::default(), &mut ()).unwrap().result;
-    (result.net().positions().to_vec(), result.shape().to_vec())
+    result.net().positions().to_vec()
 }
 
 fn near(got: &[DVec3], want: impl Iterator<Item = DVec3>, size: f64) -> bool {
@@ -58,19 +75,28 @@ proptest! {
 
     #[test]
     fn a_moved_and_scaled_net_becomes_the_moved_and_scaled_skin(by in similarity(), seed in 1..50_u64) {
-        let (positions, quads) = jittered(seed);
-        let (want, shape) = solved(positions.clone(), &quads);
-        let (got, other) = solved(positions.iter().map(|p| by.of(*p)).collect(), &quads);
-        prop_assert!(near(&got, want.iter().map(|p| by.of(*p)), by.scale));
-        prop_assert!(shape.iter().zip(&other).all(|(a, b)| (a - b).abs() < 1e-7));
+        // Near the smooth surface: feet on a mesh may jump from facet to facet by rounding.
+        let model = asymptotic_nets::scherk(5).jittered(0.05, seed);
+        let skin = |by: Similarity| {
+            let positions = model.positions.iter().map(|p| by.of(*p)).collect();
+            let net = QuadNet::new(&PolyMesh::new(positions, &model.quads).unwrap()).unwrap();
+            let surface = Moved { surface: &*model.surface, by };
+            let input = Input::near_surface(&net, &surface);
+            solve(&input, &Options::default(), &mut ()).unwrap().result
+        };
+        let (still, moved) =
+            (skin(Similarity { turn: DMat3::IDENTITY, scale: 1.0, shift: DVec3::ZERO }), skin(by));
+        let want = still.net().positions().iter().map(|p| by.of(*p));
+        prop_assert!(near(moved.net().positions(), want, by.scale));
+        prop_assert!(still.shape().iter().zip(moved.shape()).all(|(a, b)| (a - b).abs() < 1e-7));
     }
 
     #[test]
     fn a_mirrored_net_becomes_the_mirrored_skin(seed in 1..50_u64) {
         let (positions, quads) = jittered(seed);
         let mirror = |p: &DVec3| DVec3::new(p.x, -p.y, p.z);
-        let (want, _) = solved(positions.clone(), &quads);
-        let (got, _) = solved(positions.iter().map(mirror).collect(), &quads);
+        let want = solved(positions.clone(), &quads);
+        let got = solved(positions.iter().map(mirror).collect(), &quads);
         prop_assert!(near(&got, want.iter().map(mirror), 1.0));
     }
 
@@ -84,8 +110,8 @@ proptest! {
         positions.iter().enumerate().for_each(|(v, p)| renumbered[number(v)] = *p);
         let turned = |q: &[u32; 4]| [2, 3, 0, 1].map(|k| number(q[k] as usize) as u32);
         let faces: Vec<[u32; 4]> = quads.iter().rev().map(turned).collect();
-        let (want, _) = solved(positions, &quads);
-        let (got, _) = solved(renumbered, &faces);
+        let want = solved(positions, &quads);
+        let got = solved(renumbered, &faces);
         prop_assert!(near(&want, (0..n).map(|v| got[number(v)]), 1.0));
     }
 }
@@ -168,10 +194,12 @@ proptest! {
         let map = DarbouxMap::new(c).unwrap().in_frame(origin, unit).unwrap();
         let p = origin + x * unit;
         let y = map.image(p, Branch::Regular).unwrap();
-        prop_assert!(map.preimage(y).unwrap().distance(p) < 1e-8 * unit);
+        // Far from the origin of the frame its squares cancel.
+        let accuracy = 1e-11 * (1.0 + origin.length() / unit).powi(4) * unit;
+        prop_assert!(map.preimage(y).unwrap().distance(p) < accuracy);
         // A frame only changes units.
         let plain = DarbouxMap::new(c).unwrap().image(x, Branch::Regular).unwrap();
-        prop_assert!((origin + plain * unit).distance(y) < 1e-8 * unit);
+        prop_assert!((origin + plain * unit).distance(y) < accuracy);
     }
 
     #[test]

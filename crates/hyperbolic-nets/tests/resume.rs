@@ -85,7 +85,7 @@ fn the_published_method_resumes_with_the_same_bytes() {
 
 #[test]
 fn checkpoints_of_another_run_are_refused() {
-    let model = asymptotic_nets::scherk(4);
+    let model = asymptotic_nets::scherk(8);
     let net = QuadNet::new(&PolyMesh::new(model.positions, &model.quads).unwrap()).unwrap();
     let mut first = Moments::default();
     solve(&Input::new(&net), &Options::default(), &mut first).unwrap();
