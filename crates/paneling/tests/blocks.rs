@@ -73,10 +73,8 @@ fn the_problem_begins_where_the_seam_step_does() {
     let history = solve(&surface, &options, &mut ()).unwrap().result.seam_history;
     let report = minimise(problem, &mut x, &gp_solver::Options::default()).unwrap();
     assert!((2.0 * report.initial_energy - history[0]).abs() < 1e-9 * history[0]);
-    // The matrix-free steps end at 3 %; the minimum is not far below, and not above.
-    let last = history[history.len() - 1];
-    let least = 2.0 * report.final_energy;
-    assert!(least < last * (1.0 + 1e-9) && least > 0.5 * last, "{least} {last}");
+    // The matrix-free steps end at 3 %: the minimum is below.
+    assert!(2.0 * report.final_energy <= history[history.len() - 1]);
 }
 
 #[test]
@@ -91,8 +89,7 @@ fn an_extra_that_changes_nothing_changes_nothing() {
     let with = solve_with(&surface, &options, &mut look, &mut ()).unwrap();
     let without = solve(&surface, &options, &mut ()).unwrap();
     assert_eq!(with.result, without.result);
-    assert_eq!(stages.len(), 1);
-    assert_eq!(stages[0].1, 6 * 12 + 7 * 3);
+    assert_eq!(stages, [("seams".to_owned(), 6 * 12 + 7 * 3)]);
 }
 
 #[test]

@@ -276,10 +276,17 @@ mod tests {
         }
     }
 
+    struct Stop;
+    impl Observer for Stop {
+        fn stop_requested(&mut self) -> bool {
+            true
+        }
+    }
+
     #[test]
     fn ends_have_their_names() {
-        let b = vec![1.0; 400];
-        let mut x = vec![0.0; 400];
+        let b = [1.0; 400];
+        let mut x = [0.0; 400];
         let mut solver = ConjugateGradients::new();
         let mut run = |b: &[f64], options: &CgOptions, observer: &mut dyn Observer| {
             solver.solve(&mut Poisson(20), &mut (), b, &mut x, options, observer)
@@ -287,22 +294,15 @@ mod tests {
         let few = CgOptions { max_iterations: 3, ..CgOptions::default() };
         let report = run(&b, &few, &mut ());
         assert_eq!((report.status, report.iterations), (Status::IterationLimit, 3));
-        struct Stop;
-        impl Observer for Stop {
-            fn stop_requested(&mut self) -> bool {
-                true
-            }
-        }
         let report = run(&b, &CgOptions::default(), &mut Stop);
         assert_eq!((report.status, report.iterations), (Status::Interrupted, 0));
-        let report = run(&vec![0.0; 400], &CgOptions::default(), &mut ());
+        let report = run(&[0.0; 400], &CgOptions::default(), &mut ());
         assert_eq!((report.status, report.iterations), (Status::Converged, 0));
-        let negative = Dense(DMatrix::from_diagonal_element(2, 2, -1.0));
+        let mut negative = Dense(DMatrix::from_diagonal_element(2, 2, -1.0));
         let mut solver = ConjugateGradients::new();
         let options = CgOptions::default();
         let mut x = [0.0; 2];
-        let report =
-            solver.solve(&mut { negative }, &mut (), &[1.0, 0.0], &mut x, &options, &mut ());
+        let report = solver.solve(&mut negative, &mut (), &[1.0, 0.0], &mut x, &options, &mut ());
         assert_eq!(report.status, Status::Stalled);
     }
 }

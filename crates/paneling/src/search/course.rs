@@ -163,7 +163,7 @@ impl<'s> Course<'s> {
         let mut shown = None;
         let mut solver = ConjugateGradients::new();
         while !matches!(attempt.phase, Phase::Done) {
-            let stage = self.stage(what, &attempt.phase);
+            let stage = self.stage(what, matches!(attempt.phase, Phase::Rounds(..)));
             // The start of a stage, and every step.
             let is_new = shown != Some((stage.number, attempt.steps));
             if is_new && !matches!(attempt.phase, Phase::General(..)) {
@@ -173,7 +173,7 @@ impl<'s> Course<'s> {
             if pulse.is_stopped() {
                 return Ok(None);
             }
-            let mut setting = self.setting(what, attempt, extra.as_deref_mut(), pulse);
+            let mut setting = self.setting(what, extra.as_deref_mut(), pulse);
             let save = |a: &Attempt| self.save(Some(a));
             if attempt.advance(&mut solver, &mut setting, &save)?.is_none() {
                 return Ok(None);
@@ -186,7 +186,6 @@ impl<'s> Course<'s> {
     fn setting<'a, 'o, 'e>(
         &'a self,
         what: Try,
-        attempt: &Attempt,
         extra: Option<&'a mut Extra<'e, Error>>,
         pulse: &'a Pulse<'o>,
     ) -> Setting<'a, 'o, 'e> {
@@ -198,7 +197,7 @@ impl<'s> Course<'s> {
             limit: limit.map_or(f64::INFINITY, |b| self.site.cost(&b.fit)),
             pulse,
             extra,
-            stage: self.stage(what, &attempt.phase),
+            stage: self.stage(what, false),
         }
     }
 
@@ -233,10 +232,9 @@ impl<'s> Course<'s> {
     }
 
     /// Under bounds every attempt is a stage; otherwise its fit and its seam steps are one each.
-    fn stage(&self, what: Try, phase: &Phase) -> Stage {
+    fn stage(&self, what: Try, is_fit: bool) -> Stage {
         let is_search = self.site.bounds().is_some();
         let before = usize::from(!is_search);
-        let is_fit = matches!(phase, Phase::Rounds(..));
         let (name, number) = match what {
             Try::Grid => ("grid".to_owned(), self.number + before),
             Try::Molds(molds, _) if is_search => (format!("{molds} molds"), self.number),
