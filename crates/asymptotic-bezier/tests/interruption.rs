@@ -67,11 +67,11 @@ fn resumes_to_the_same_bytes(input: &Input, options: &Options) {
     }
 }
 
-/// A net whose tangents and curvatures have half a percent of noise.
+/// A net whose tangents and curvatures have one percent of noise.
 fn noisy_net() -> AsymptoticNet {
     let net = exact_net(catenoid, [0.2, 1.4, -0.1, 0.9], [2, 2]);
     let mut gauss = Gauss::new(3);
-    let mut noisy = |x: f64| x * (1.0 + 0.005 * gauss.next());
+    let mut noisy = |x: f64| x * (1.0 + 0.01 * gauss.next());
     let curves: Vec<NetCurve> = net
         .curves()
         .iter()
