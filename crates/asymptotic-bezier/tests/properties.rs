@@ -26,10 +26,17 @@ fn window() -> impl Strategy<Value = [f64; 4]> {
 }
 
 fn corner_window() -> impl Strategy<Value = CornerData> {
-    (window(), any::<bool>()).prop_map(|(window, which)| match which {
+    let data = (window(), any::<bool>()).prop_map(|(window, which)| match which {
         true => corner_data(catenoid, window),
         false => corner_data(enneper, window),
-    })
+    });
+    data.prop_filter("no side inflects", |data| is_uninflected(data.clone()))
+}
+
+/// Whether no curve has an inflection, which data would have to declare.
+fn is_uninflected(input: impl Into<asymptotic_bezier::Input>) -> bool {
+    let solved = solve(&input.into(), &Options::default(), &mut ());
+    !matches!(solved, Err(Error::InflectionParity { .. }))
 }
 
 fn scaled(data: &CornerData, map: impl Fn(DVec3) -> DVec3, scale: f64) -> CornerData {
@@ -117,6 +124,7 @@ proptest! {
     #[test]
     fn renumbered_vertices_give_the_same_shell(window in window(), shift in 1_usize..8) {
         let net = exact_net(catenoid, window, [2, 2]);
+        prop_assume!(is_uninflected(net.clone()));
         let n = net.positions().len();
         let to = |v: usize| (v + shift) % n;
         let mut positions = vec![DVec3::ZERO; n];
@@ -140,6 +148,7 @@ proptest! {
         shift in prop::array::uniform3(-2.0..2.0_f64),
     ) {
         let net = exact_net(enneper, window, [2, 2]);
+        prop_assume!(is_uninflected(net.clone()));
         let turn = DMat3::from_rotation_x(angles[0]) * DMat3::from_rotation_y(angles[1])
             * DMat3::from_rotation_z(angles[2]);
         let map = |p: DVec3| turn * p + DVec3::from_array(shift);
@@ -158,6 +167,7 @@ proptest! {
     #[test]
     fn joins_cost_energy_and_never_kink(window in window()) {
         let net = exact_net(catenoid, window, [2, 2]);
+        prop_assume!(is_uninflected(net.clone()));
         let by = |joins| solved(net.clone(), &Options { joins, degree: Some(7), ..Options::default() });
         let (g1, c1) = (by(Joins::G1).metrics, by(Joins::C1).metrics);
         prop_assert!(c1.thin_plate_energy >= g1.thin_plate_energy * (1.0 - 1e-9));

@@ -74,3 +74,8 @@ pub use layers::{FaceGroups, FieldScale, LineRole, LineSet, ScalarField};
 pub use plots::{EnergyHistory, Histogram, RelationCurve, Seam, SeamTable, Series};
 pub use report::Report;
 pub use surface_view::SurfaceView;
+
+/// Runs the example of the README.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;

@@ -6,13 +6,7 @@ use crate::shell::{Outcome, read, root};
 use std::collections::BTreeSet;
 
 /// Blocks without such a test; this list may only become shorter.
-const EXCEPTED: &[&str] = &[
-    "hyperbolic-nets: Combinations",
-    "hyperbolic-nets: FramePoints",
-    "hyperbolic-nets: Proximity",
-    "hyperbolic-nets: QuadDistances",
-    "hyperbolic-nets: Weighted",
-];
+const EXCEPTED: &[&str] = &[];
 
 /// Compares the blocks of all crates with the tests that check derivatives.
 pub(crate) fn check(faults: &mut Vec<String>) -> Outcome {

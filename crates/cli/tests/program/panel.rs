@@ -55,11 +55,11 @@ fn bad_input_is_one_sentence() {
     refused(&["--prices", &missing], &format!("{missing}: the price list has no entry for cubic"));
     refused(&["--prices", &negative], &format!("{negative}: the price of cubic is -1"));
     refused(&["--mold-types", "plane,cubic"], "several mold types need bounds to choose by");
-    refused(&["--mold-types", "conic"], "unknown mold type `conic`");
-    refused(&["--max-kink-deg=-1"], "`max_kink_deg` is -1; it must be positive");
+    refused(&["--mold-types", "conic"], "`conic` is none of plane, cylinder");
+    refused(&["--max-kink-deg=-1"], "--max-kink-deg is -1; it must be positive");
     refused(&["--k", "2", "--molds", "5"], "exclude one another; keep one");
-    refused(&["--clustering", "best"], "unknown clustering `best`; use own, grid or cover");
-    refused(&["--layout", "circles"], "unknown layout `circles`");
+    refused(&["--clustering", "best"], "`best` is none of own, grid, cover");
+    refused(&["--layout", "circles"], "`circles` is none of quad, staggered");
     refused(&["--sheet", "3"], "is not of the form WxH");
 }
 
