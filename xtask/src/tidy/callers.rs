@@ -60,8 +60,8 @@ fn exported(front: &str) -> BTreeSet<&str> {
         let end = rest.iter().position(|t| *t == ";").unwrap_or(rest.len());
         let item = &rest[..end];
         match item.iter().position(|t| *t == "{") {
-            Some(open) => names.extend(item[open..].iter().filter(|t| is_name(t)).copied()),
-            None => names.extend(item.iter().rev().find(|t| is_name(t)).copied()),
+            Some(open) => names.extend(item[open..].iter().filter(is_name).copied()),
+            None => names.extend(item.iter().rev().find(is_name).copied()),
         }
     }
     names

@@ -31,9 +31,11 @@ impl LinearEquation {
         self.value - self.entries.iter().map(|(i, a)| a * x[*i]).sum::<f64>()
     }
 
-    /// Whether `|Σ a x − b| ≤ tolerance · (Σ |a x| + |b|)`.
+    /// Whether `|Σ a x − b| ≤ tolerance · (Σ |a| max |x| + |b|)`: relative to all unknowns, since an
+    /// equation whose own unknowns come out as zero has no size of its own.
     pub(super) fn is_met(&self, x: &[f64], tolerance: f64) -> bool {
-        let size = self.entries.iter().map(|(i, a)| (a * x[*i]).abs()).sum::<f64>();
+        let largest = x.iter().fold(0.0, |m: f64, x| m.max(x.abs()));
+        let size = self.entries.iter().map(|(_, a)| a.abs()).sum::<f64>() * largest;
         self.defect(x).abs() <= tolerance * (size + self.value.abs())
     }
 

@@ -11,7 +11,7 @@ const SHIFT: f64 = 1e-13;
 /// the directions that need it.
 const ROUNDS: usize = 20;
 /// Rounds at most until equations are met.
-const MOST_ROUNDS: usize = 1000;
+const MOST_ROUNDS: usize = 100;
 /// Weight of an equation against the largest diagonal entry.
 const PENALTY: f64 = 1e2;
 /// Defects relative to the numbers of an equation at which the rounds end, and at which it counts

@@ -134,7 +134,7 @@ impl Assembly {
     ///
     /// A change `dω` turns by `J dω` with the left Jacobian `J` of the rotation and moves by
     /// `dδ − J dω × δ`.
-    pub(crate) fn from_here(&self, x: &[f64], panel: usize, row: &[f64]) -> [f64; POSE] {
+    pub(crate) fn row_from_here(&self, x: &[f64], panel: usize, row: &[f64]) -> [f64; POSE] {
         let step = self.step(x, panel);
         let (delta, omega) = (DVec3::from_slice(&step[..3]), DVec3::from_slice(&step[3..]));
         let (along, turn) = (DVec3::from_slice(&row[..3]), DVec3::from_slice(&row[3..POSE]));

@@ -80,7 +80,7 @@ impl ResidualBlock for DesignRows {
                 let mold_rows = sample_mold_rows(&mold, w, local);
                 *out = r;
                 for (k, row) in rows.chunks_exact_mut(width).enumerate() {
-                    row[..POSE].copy_from_slice(&assembly.from_here(x, p, &pose_rows[k]));
+                    row[..POSE].copy_from_slice(&assembly.row_from_here(x, p, &pose_rows[k]));
                     row[POSE..].copy_from_slice(&mold_rows[k][..width - POSE]);
                 }
             }
@@ -138,7 +138,7 @@ impl ResidualBlock for ReachRows {
         for (p, (out, row)) in residuals.iter_mut().zip(rows).enumerate() {
             let (r, here) = self.row(x, p);
             *out = r;
-            *row = self.assembly.from_here(x, p, &here);
+            *row = self.assembly.row_from_here(x, p, &here);
         }
     }
 }

@@ -79,7 +79,7 @@ impl SeamRows {
                     for (side, &p) in seam.panels.iter().enumerate() {
                         let sign = if side == 0 { self.roots[s] } else { -self.roots[s] };
                         let own: &[f64; SIDE] = &sides[side].rows[first + row];
-                        let pose = assembly.from_here(x, p, &own[..POSE]);
+                        let pose = assembly.row_from_here(x, p, &own[..POSE]);
                         let place = POSE * side;
                         for (e, v) in entries[place..place + POSE].iter_mut().zip(pose) {
                             *e = sign * v;

@@ -4,7 +4,7 @@ use crate::blocks::{Assembly, DesignRows, GapRows, KinkRows, ReachRows};
 use crate::error::Error;
 use crate::fit::state::Fit;
 use crate::seam::unknowns::Seams;
-use gp_solver::{Extra, Options, Problem, Run, Stage, System};
+use gp_solver::{BlockId, Extra, Options, Problem, Run, Stage, System};
 use std::sync::Arc;
 
 /// The seam step at a fit as a problem: the same rows as the matrix-free system, so that its energy
@@ -41,7 +41,7 @@ impl SeamProblem {
     }
 
     /// Blocks with their weights, and the fixed unknowns.
-    fn form(&self) -> Result<(Vec<(gp_solver::BlockId, f64)>, Vec<bool>), Error> {
+    fn form(&self) -> Result<Form, Error> {
         let ids: Vec<_> = self.problem.blocks().map(|(id, _)| id).collect();
         let weighed: Result<_, _> =
             ids.into_iter().map(|id| self.problem.weight(id).map(|weight| (id, weight))).collect();
@@ -62,6 +62,9 @@ impl SeamProblem {
         Ok((Run::new(system, &x, &options)?, self.assembly))
     }
 }
+
+/// What a caller may have changed: blocks with their weights, and which unknowns are fixed.
+type Form = (Vec<(BlockId, f64)>, Vec<bool>);
 
 /// Puts molds and panels of `fit` where the unknowns say.
 pub(crate) fn take(assembly: &Assembly, x: &[f64], fit: &mut Fit) {
