@@ -122,7 +122,10 @@ fn arg<O: Fields>(field: &'static Field<O>, defaults: &O) -> Arg {
     let is_rare = field.doc.iter().any(|line| line.to_lowercase().contains("rarely needed"));
     let arg = arg.hide_short_help(is_rare);
     if field.is_switch {
-        return arg.num_args(0).default_missing_value("true");
+        // `--flag` or `--flag=false`; the action is named, since clap's own for a flag without a
+        // value would say false where it is not given.
+        let arg = arg.num_args(0..=1).require_equals(true).default_missing_value("true");
+        return arg.action(ArgAction::Set).hide_possible_values(true).value_name("BOOL");
     }
     let action = if field.separator.is_some() { ArgAction::Append } else { ArgAction::Set };
     arg.value_name(field.form).action(action).allow_hyphen_values(true)
