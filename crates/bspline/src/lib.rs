@@ -5,7 +5,9 @@
 //! are clamped to it, or wrapped where the direction is periodic.
 
 mod basis;
+mod conic;
 mod curve;
+mod elementary;
 mod error;
 mod fit;
 mod grid_fit;
@@ -13,11 +15,15 @@ mod knots;
 mod rational;
 mod refine;
 mod statistics;
+mod subdomain;
 mod surface;
+mod sweep;
 mod table;
 
 pub use basis::{BasisValues, MAX_DERIVATIVE};
+pub use conic::ArcSpans;
 pub use curve::BsplineCurve;
+pub use elementary::{Elementary, ElementaryKind, Frame};
 pub use error::SplineError;
 pub use fit::{FitError, fit_curve, fit_surface};
 pub use grid_fit::{GridFit, GridFitOptions, fit_grid};
@@ -25,4 +31,5 @@ pub use knots::{Degree, KnotError, KnotVector};
 pub use rational::BINOMIAL;
 pub use refine::BezierPiece;
 pub use surface::BsplineSurface;
+pub use sweep::Axis;
 pub use table::{BasisTable, SampleGrid, SpanSamples};
