@@ -5,24 +5,42 @@
 //! are clamped to it, or wrapped where the direction is periodic.
 
 mod basis;
+mod closest;
+mod conic;
 mod curve;
+mod elementary;
 mod error;
+mod face;
 mod fit;
 mod grid_fit;
 mod knots;
+mod lift;
+mod offset;
 mod rational;
 mod refine;
+mod region;
 mod statistics;
+mod subdomain;
 mod surface;
+mod sweep;
 mod table;
+mod trim;
 
 pub use basis::{BasisValues, MAX_DERIVATIVE};
+pub use closest::SurfaceLocator;
+pub use conic::ArcSpans;
 pub use curve::BsplineCurve;
+pub use elementary::{Elementary, ElementaryKind, Frame};
 pub use error::SplineError;
+pub use face::{Carrier, Face, FaceEdge, FaceError};
 pub use fit::{FitError, fit_curve, fit_surface};
 pub use grid_fit::{GridFit, GridFitOptions, fit_grid};
 pub use knots::{Degree, KnotError, KnotVector};
+pub use offset::OffsetError;
 pub use rational::BINOMIAL;
 pub use refine::BezierPiece;
+pub use region::{Region, RegionNode};
 pub use surface::BsplineSurface;
+pub use sweep::Axis;
 pub use table::{BasisTable, SampleGrid, SpanSamples};
+pub use trim::{Trim, TrimCurve, TrimError, TrimLoop};

@@ -127,7 +127,7 @@ fn express(
             let (mut best, mut distance) = (start, f64::INFINITY);
             for s in i..=i + e {
                 let m = 0.5 * (t[s] + t[s + 1]);
-                let inside = target.is_periodic() || (t[s] >= start && t[s + 1] <= end);
+                let inside = source.is_periodic() || (t[s] >= start && t[s + 1] <= end);
                 if t[s] < t[s + 1] && inside && (m - middle).abs() < distance {
                     (best, distance) = (m, (m - middle).abs());
                 }
@@ -195,7 +195,7 @@ fn projected(points: &[DVec4], is_rational: bool) -> (Vec<DVec3>, Option<Vec<f64
 }
 
 impl BsplineCurve {
-    fn expressed(&self, target: &KnotVector) -> Result<Self, SplineError> {
+    pub(crate) fn expressed(&self, target: &KnotVector) -> Result<Self, SplineError> {
         let control = homogeneous(self.control_points(), self.weights());
         let points = express(self.knots(), target, 1, |_, i| control[i]);
         let (points, weights) = projected(&points, self.weights().is_some());
@@ -236,7 +236,11 @@ fn elevated_knots(knots: &KnotVector, degree: Degree) -> Result<KnotVector, Knot
 }
 
 impl BsplineSurface {
-    fn expressed(&self, target_u: &KnotVector, target_v: &KnotVector) -> Result<Self, SplineError> {
+    pub(crate) fn expressed(
+        &self,
+        target_u: &KnotVector,
+        target_v: &KnotVector,
+    ) -> Result<Self, SplineError> {
         let (n_u, n_v) = (self.n_u(), self.n_v());
         let control = homogeneous(self.control_points(), self.weights());
         // In u first: one spline per column, which leaves [j * new_u + i].

@@ -6,7 +6,7 @@ use geom_core::{CurvatureStatistics, SurfaceJet};
 use std::ops::Range;
 
 /// Nodes and weights of five-point Gauss-Legendre quadrature on `[0, 1]`, exact to degree 9.
-const GAUSS: [(f64, f64); 5] = [
+pub(crate) const GAUSS: [(f64, f64); 5] = [
     (0.046_910_077_030_668, 0.118_463_442_528_094_54),
     (0.230_765_344_947_158_46, 0.239_314_335_249_683_23),
     (0.5, 0.284_444_444_444_444_44),
@@ -14,7 +14,7 @@ const GAUSS: [(f64, f64); 5] = [
     (0.953_089_922_969_332, 0.118_463_442_528_094_54),
 ];
 /// Knot spans are cut until a direction has at least this many cells.
-const CELLS: usize = 16;
+pub(crate) const CELLS: usize = 16;
 
 impl BsplineSurface {
     /// Area and curvatures of the surface: area and means by Gauss quadrature with 5 x 5 nodes in
@@ -52,7 +52,7 @@ impl BsplineSurface {
     }
 }
 
-fn add(statistics: &mut CurvatureStatistics, jet: &SurfaceJet, weight: f64) {
+pub(crate) fn add(statistics: &mut CurvatureStatistics, jet: &SurfaceJet, weight: f64) {
     match (jet.mean_curvature(), jet.gaussian_curvature()) {
         (Ok(h), Ok(k)) => statistics.add(jet.position(), weight, h, k),
         _ => statistics.add_singular(jet.position()),

@@ -79,3 +79,12 @@ impl From<std::io::Error> for WriteError {
         Self::Io { reason: error.to_string() }
     }
 }
+
+/// The beginning of a word, fit for a message.
+pub(crate) fn clip(word: &str) -> String {
+    const LONGEST: usize = 24;
+    match word.char_indices().nth(LONGEST) {
+        Some((end, _)) => format!("{}…", &word[..end]),
+        None => word.to_owned(),
+    }
+}

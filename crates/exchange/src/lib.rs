@@ -19,6 +19,7 @@ mod csv;
 mod drawing;
 mod error;
 mod files;
+mod format;
 mod glb;
 mod json;
 mod mesh;
@@ -41,13 +42,13 @@ pub use csv::write_csv;
 pub use drawing::{Drawing, DrawnLine, Label, write_dxf, write_svg};
 pub use error::{ReadError, WriteError};
 pub use files::{check_writable, read_bytes, read_text, write_files};
+pub use format::{
+    READABLE, WRITABLE, check_format, decode_model, encode_model, extension_of, read_model,
+};
 pub use glb::{read_glb, write_glb};
 pub use json::{read_json, write_compas, write_geomdl};
 pub use mesh::{Field, Group, IndexLists, Mesh};
-pub use model::{
-    Model, NamedSurface, PointGrid, READABLE, WRITABLE, check_format, decode_model, encode_model,
-    extension_of, read_model,
-};
+pub use model::{Model, NamedSurface, PointGrid};
 pub use net::{Net, read_net, write_net};
 pub use obj::{read_obj, write_obj, write_obj_and_materials};
 pub use off::read_off;

@@ -56,7 +56,7 @@ fn millimetre() -> String {
 pub fn read_net(text: &str) -> Result<Net, ReadError> {
     let net: NetText = from_ron(text)?;
     let Some(unit) = LengthUnit::from_symbol(&net.unit) else {
-        let what = format!("`{}` is not a unit of length", crate::obj::clip(&net.unit));
+        let what = format!("`{}` is not a unit of length", crate::error::clip(&net.unit));
         return Err(ReadError::content(what, "use mm, cm, dm, m, km, in, ft, yd or mi"));
     };
     let vectors = |list: Vec<(f64, f64, f64)>, name: &str| {

@@ -2,7 +2,7 @@
 //! materials are skipped when reading; free-form curves of degree 1 are polylines.
 
 use crate::color::{display, palette};
-use crate::error::ReadError;
+use crate::error::{ReadError, clip};
 use crate::mesh::{Group, Mesh};
 use geom_core::DVec3;
 use std::collections::HashMap;
@@ -198,15 +198,6 @@ pub(crate) fn coordinate(word: &str, line: usize) -> Result<f64, ReadError> {
             let what = format!("`{}` is not a finite number", clip(word));
             Err(ReadError::text(line, what, "write coordinates as decimal numbers"))
         }
-    }
-}
-
-/// The beginning of a word, fit for a message.
-pub(crate) fn clip(word: &str) -> String {
-    const LONGEST: usize = 24;
-    match word.char_indices().nth(LONGEST) {
-        Some((end, _)) => format!("{}…", &word[..end]),
-        None => word.to_owned(),
     }
 }
 

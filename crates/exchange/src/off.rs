@@ -1,8 +1,8 @@
 //! OFF, the polygon format of Geomview.
 
-use crate::error::ReadError;
+use crate::error::{ReadError, clip};
 use crate::mesh::Mesh;
-use crate::obj::{clip, coordinate};
+use crate::obj::coordinate;
 use geom_core::DVec3;
 
 /// Reads an OFF file (also `COFF`, `NOFF`, `STOFF` and their combinations: extra numbers of

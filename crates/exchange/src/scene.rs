@@ -64,7 +64,7 @@ struct GridText {
 pub fn read_scene(text: &str) -> Result<Model, ReadError> {
     let scene: Scene = from_ron(text)?;
     let Some(unit) = LengthUnit::from_symbol(&scene.unit) else {
-        let what = format!("`{}` is not a unit of length", crate::obj::clip(&scene.unit));
+        let what = format!("`{}` is not a unit of length", crate::error::clip(&scene.unit));
         return Err(ReadError::content(what, "use mm, cm, dm, m, km, in, ft, yd or mi"));
     };
     let mut model = Model { unit, ..Model::default() };

@@ -112,7 +112,7 @@ pub fn read_glb(bytes: &[u8]) -> Result<Model, ReadError> {
     check_depth(text)?;
     let document: Document = serde_json::from_str(text).map_err(|e| fault(&e))?;
     if let Some(extension) = document.extensions_required.first() {
-        let what = format!("the file needs the extension {}", crate::obj::clip(extension));
+        let what = format!("the file needs the extension {}", crate::error::clip(extension));
         return Err(ReadError::content(what, "export it without compression"));
     }
     let budget = MOST_BYTES.saturating_add(bytes.len().saturating_mul(8));
@@ -350,7 +350,10 @@ impl Reader<'_> {
             "VEC3" => 3,
             "VEC4" => 4,
             other => {
-                return fail(format!("accessor {index} has the type {}", crate::obj::clip(other)));
+                return fail(format!(
+                    "accessor {index} has the type {}",
+                    crate::error::clip(other)
+                ));
             }
         };
         if accessor.kind != kind {

@@ -1,11 +1,10 @@
 //! The layout of COMPAS 2: `{"dtype": "compas.datastructures/Mesh", "data": {...}}`, or a list of
 //! such objects. Rows of a NURBS surface run along u: `points[j][i]`.
 
-use super::{fault, refused};
-use crate::error::ReadError;
+use super::fault::{fault, refused};
+use crate::error::{ReadError, clip};
 use crate::mesh::Mesh;
 use crate::model::{Model, NamedSurface};
-use crate::obj::clip;
 use crate::wrapped::{Direction, unwrap, wrapped};
 use bspline::{BsplineSurface, Degree, KnotVector, SplineError};
 use geom_core::DVec3;

@@ -1,6 +1,6 @@
 //! The layout of geomdl 5: `{"shape": {"type": "surface", "data": [...]}}`.
 
-use super::{fault, refused};
+use super::fault::{fault, refused};
 use crate::error::ReadError;
 use crate::model::{Model, NamedSurface};
 use crate::wrapped::{Direction, unwrap, wrapped};
@@ -59,7 +59,7 @@ struct ControlPoints {
 pub(super) fn read(text: &str) -> Result<Model, ReadError> {
     let file: File = serde_json::from_str(text).map_err(|e| fault(&e))?;
     if file.shape.kind != "surface" {
-        let what = format!("a geomdl file of type `{}`", crate::obj::clip(&file.shape.kind));
+        let what = format!("a geomdl file of type `{}`", crate::error::clip(&file.shape.kind));
         return Err(ReadError::content(what, "only surfaces are read"));
     }
     let mut model = Model::default();

@@ -1,7 +1,6 @@
 //! The header: what elements follow, and how.
 
-use crate::error::ReadError;
-use crate::obj::clip;
+use crate::error::{ReadError, clip};
 
 /// How numbers are stored.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -2,10 +2,9 @@
 
 use super::header::{Element, Encoding, Header, Number, Property, read_header};
 use crate::color::linear;
-use crate::error::ReadError;
+use crate::error::{ReadError, clip};
 use crate::mesh::{Field, Group, Mesh};
 use crate::model::Model;
-use crate::obj::clip;
 use crate::unit::LengthUnit;
 use geom_core::DVec3;
 

@@ -1,8 +1,8 @@
 //! Faces: the names they give to surfaces, and whether they are trimmed.
 
 use super::border::{Border, Side};
+use super::file::{StepFile, counted};
 use super::parse::{Cursor, Instance};
-use super::read::{StepFile, counted};
 use crate::error::ReadError;
 use bspline::BsplineSurface;
 use geom_core::{BoundingBox, DVec3};

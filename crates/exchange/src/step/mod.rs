@@ -2,6 +2,7 @@
 
 mod border;
 mod face;
+mod file;
 mod parse;
 mod read;
 mod text;

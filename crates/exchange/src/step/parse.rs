@@ -3,8 +3,7 @@
 //! Nothing is kept as a tree: the index has 16 bytes an instance, and what is asked for is read
 //! from the text. Nesting is checked once, when the index is made.
 
-use crate::error::ReadError;
-use crate::obj::clip;
+use crate::error::{ReadError, clip};
 use crate::ron_text::MAX_DEPTH;
 
 /// One `#id=…;`, by the position of its body.

@@ -1,0 +1,175 @@
+//! The choice of reader and writer by extension.
+
+use crate::drawing::{Drawing, DrawnLine, write_dxf, write_svg};
+use crate::error::{ReadError, WriteError};
+use crate::files::{into_text, read_bytes};
+use crate::glb::{read_glb, write_glb};
+use crate::json::{read_json, write_compas, write_geomdl};
+use crate::mesh::Mesh;
+use crate::model::Model;
+use crate::obj::{read_obj, write_obj};
+use crate::off::read_off;
+use crate::ply::{read_ply, write_ply};
+use crate::sample::surface_mesh;
+use crate::scene::{read_scene, write_scene};
+use crate::step::{read_step, write_step};
+use crate::stl::{read_stl, write_stl};
+use geom_core::DVec3;
+use std::borrow::Cow;
+use std::path::Path;
+
+/// Extensions that [`read_model`] knows.
+pub const READABLE: &str = "ron, step, stp, obj, ply, off, stl, glb, json";
+/// Coordinates GLB's single precision can hold, distances between them included.
+const SINGLE_PRECISION: f64 = 1e38;
+
+/// Extensions that [`encode_model`] knows.
+pub const WRITABLE: &str = "ron, step, stp, obj, ply, stl, glb, json, svg, dxf";
+
+/// Reads any file of geometry, by its extension.
+///
+/// # Errors
+/// [`ReadError`] of the reader, or [`ReadError::UnknownFormat`].
+pub fn read_model(path: &Path) -> Result<Model, ReadError> {
+    let extension = extension_of(path);
+    if !is_listed(READABLE, &extension) {
+        return Err(ReadError::UnknownFormat { extension, known: READABLE });
+    }
+    decode_model(&extension, read_bytes(path)?)
+}
+
+/// Reads the bytes of a file with this (lower case) extension.
+///
+/// # Errors
+/// As [`read_model`].
+pub fn decode_model(extension: &str, bytes: Vec<u8>) -> Result<Model, ReadError> {
+    match extension {
+        "ron" => read_scene(&into_text(bytes)?),
+        "step" | "stp" => read_step(&bytes),
+        "obj" => read_obj(&into_text(bytes)?).map(of_mesh),
+        "ply" => read_ply(&bytes),
+        "off" => read_off(&into_text(bytes)?).map(|mesh| of_mesh((mesh, Vec::new()))),
+        "stl" => read_stl(&bytes).map(of_mesh),
+        "glb" => read_glb(&bytes),
+        "json" => read_json(&into_text(bytes)?),
+        _ => Err(ReadError::UnknownFormat { extension: extension.into(), known: READABLE }),
+    }
+}
+
+/// Refuses extensions that [`encode_model`] does not know: to be asked before a long computation.
+///
+/// # Errors
+/// [`WriteError::UnknownFormat`].
+pub fn check_format(path: &Path) -> Result<(), WriteError> {
+    let extension = extension_of(path);
+    if is_listed(WRITABLE, &extension) {
+        Ok(())
+    } else {
+        Err(WriteError::UnknownFormat { extension, known: WRITABLE })
+    }
+}
+
+/// `NAME.compas.json` asks for the layout of COMPAS where geomdl's would do.
+fn is_compas(path: &Path) -> bool {
+    path.to_string_lossy().to_lowercase().ends_with(".compas.json")
+}
+
+/// The bytes of a file at `path`, by its extension. Formats without surfaces get sampled meshes
+/// of them, with curvatures where the format can carry them.
+///
+/// # Errors
+/// [`WriteError::UnknownFormat`], or [`WriteError::Unsupported`] for content that the format
+/// cannot hold.
+pub fn encode_model(path: &Path, model: &Model) -> Result<Vec<u8>, WriteError> {
+    let extension = extension_of(path);
+    match extension.as_str() {
+        "ron" => {
+            no_meshes("a RON scene", model)?;
+            let text =
+                write_scene(model).map_err(|e| unsupported("a RON scene", &e.to_string()))?;
+            Ok(text.into_bytes())
+        }
+        "step" | "stp" => {
+            no_meshes("STEP", model)?;
+            if model.surfaces.is_empty() {
+                return Err(unsupported("STEP", "a model without surfaces"));
+            }
+            Ok(write_step(model).into_bytes())
+        }
+        "obj" => Ok(write_obj(&sampled(model)).into_bytes()),
+        "ply" => Ok(write_ply(&sampled(model), &model.unit)),
+        "stl" => {
+            let meshes = sampled(model);
+            if meshes.iter().all(|m| m.faces.is_empty()) {
+                return Err(unsupported("STL", "a model without faces"));
+            }
+            Ok(write_stl(&meshes))
+        }
+        "glb" => {
+            let meshes = sampled(model);
+            let far = |p: &DVec3| !(p.abs().max_element() < SINGLE_PRECISION);
+            if meshes.iter().any(|mesh| mesh.positions.iter().any(far)) {
+                return Err(unsupported("GLB", "coordinates of 1e38 and beyond"));
+            }
+            Ok(write_glb(&meshes, &model.unit))
+        }
+        // COMPAS has meshes and surfaces, geomdl surfaces only: the plain one where it suffices.
+        "json" if model.meshes.is_empty() && !model.surfaces.is_empty() && !is_compas(path) => {
+            Ok(write_geomdl(&model.surfaces).into_bytes())
+        }
+        "json" if !model.meshes.is_empty() || is_compas(path) => {
+            Ok(write_compas(model).into_bytes())
+        }
+        "json" => Err(unsupported("JSON", "a model without surfaces and meshes")),
+        "svg" => Ok(write_svg(&polylines(model, "SVG")?, &model.unit).into_bytes()),
+        "dxf" => Ok(write_dxf(&polylines(model, "DXF")?, &model.unit).into_bytes()),
+        _ => Err(WriteError::UnknownFormat { extension, known: WRITABLE }),
+    }
+}
+
+/// All polylines as a drawing, each mesh on a layer of its name.
+fn polylines(model: &Model, format: &'static str) -> Result<Drawing, WriteError> {
+    let mut drawing = Drawing::default();
+    for mesh in &model.meshes {
+        for k in 0..mesh.lines.len() {
+            let points = mesh.polyline(k).collect();
+            drawing.lines.push(DrawnLine { layer: mesh.name.clone(), points, closed: false });
+        }
+    }
+    if drawing.lines.is_empty() {
+        return Err(unsupported(format, "a model without polylines"));
+    }
+    Ok(drawing)
+}
+
+/// The meshes, after sampled meshes of the surfaces.
+fn sampled(model: &Model) -> Cow<'_, [Mesh]> {
+    if model.surfaces.is_empty() {
+        return Cow::Borrowed(&model.meshes);
+    }
+    let sampled = model.surfaces.iter().map(|s| surface_mesh(&s.name, &s.surface, None));
+    Cow::Owned(sampled.chain(model.meshes.iter().cloned()).collect())
+}
+
+fn of_mesh((mesh, warnings): (Mesh, Vec<String>)) -> Model {
+    Model { meshes: vec![mesh], warnings, ..Model::default() }
+}
+
+fn no_meshes(format: &'static str, model: &Model) -> Result<(), WriteError> {
+    if model.meshes.is_empty() { Ok(()) } else { Err(unsupported(format, "meshes")) }
+}
+
+fn unsupported(format: &'static str, what: &str) -> WriteError {
+    let mend = "choose another extension, or fit surfaces first".to_owned();
+    WriteError::Unsupported { format, what: what.to_owned(), mend }
+}
+
+fn is_listed(list: &str, extension: &str) -> bool {
+    list.split(", ").any(|known| known == extension)
+}
+
+/// The extension in lower case, empty if there is none.
+#[must_use]
+pub fn extension_of(path: &Path) -> String {
+    path.extension().map(|e| e.to_string_lossy().to_lowercase()).unwrap_or_default()
+}
