@@ -89,9 +89,7 @@ fn a_wall_cut_aslant_has_the_area_of_its_mean_height() {
 #[test]
 fn a_cone_closes_at_its_apex() {
     let carrier = on(ElementaryKind::Cone { radius: 3.0, slope: -0.75 });
-    let base = |from: f64, to: f64| {
-        arc(DVec3::ZERO, 3.0 * DVec3::X, 3.0 * DVec3::Y, from, to)
-    };
+    let base = |from: f64, to: f64| arc(DVec3::ZERO, 3.0 * DVec3::X, 3.0 * DVec3::Y, from, to);
     let at = |t: f64| DVec3::new(3.0 * t.cos(), 3.0 * t.sin(), 0.0);
     let apex = 4.0 * DVec3::Z;
     for extra in [vec![], vec![line(at(0.4), apex), line(apex, at(0.4))]] {
