@@ -5,18 +5,17 @@ use crate::evaluator::SurfaceEnergy;
 use crate::freedom::Freedom;
 use crate::limits::Pull;
 use crate::surface_matrix::{Matrix, Stop, SurfaceMatrix};
-use gp_solver::{Problem, SolverError, SparseCholesky, SymmetricPattern};
+use gp_solver::{Problem, SolverError, SparseMetric};
 use subdiv_catmull_clark::SubdivisionSurface;
 
-/// A metric on the unknowns, with the structure of its matrix worked out once.
-///
-/// The unknowns of a vertex form a block, and all columns of a block have the same rows, so that
-/// the structure is kept by blocks, in the order in which they are eliminated.
+/// Share of the mean diagonal that keeps unknowns that nothing sees from making a matrix singular.
+const UNSEEN: f64 = 1e-12;
+
+/// A metric on the unknowns, with the structure of its matrix worked out once. The unknowns of a
+/// vertex form a block.
 pub(crate) struct MetricAssembly {
     surface: SurfaceMatrix,
-    cholesky: SparseCholesky,
-    // Where every unknown comes in the order of elimination.
-    place: Vec<u32>,
+    matrix: SparseMetric,
     // For every ordered pair of a patch's control points how far down in the columns of the second
     // one the first unknown of the first one stands; patch after patch.
     offsets: Vec<u32>,
@@ -37,37 +36,29 @@ impl MetricAssembly {
         extra: Option<&Problem<'_>>,
     ) -> Result<Self, SolverError> {
         let surface = SurfaceMatrix::new(surface, evaluator);
-        let (pattern, place) = eliminated_pattern(&surface, evaluator, freedom, pulls, extra)?;
+        let matrix = structure(&surface, evaluator, freedom, pulls, extra)?;
         let pulls = pull_entries(freedom, pulls)
             .into_iter()
-            .map(|((i, j), value)| {
-                let slot = pattern.slot(place[i] as usize, place[j] as usize);
-                (slot.unwrap_or(0) as u32, value)
-            })
+            .map(|((i, j), value)| (matrix.slot(i, j).unwrap_or(0) as u32, value))
             .collect();
         let mut offsets = Vec::new();
-        for_pairs(surface.cliques(evaluator), freedom, &place, |a, b| {
-            let slot = pattern.slot(a, b).unwrap_or(0);
-            offsets.push((slot - pattern.column_starts()[b]) as u32);
+        for_pairs(surface.cliques(evaluator), freedom, &matrix, |a, b| {
+            let slot = matrix.slot(a, b).unwrap_or(0);
+            offsets.push((slot - matrix.column_starts()[matrix.place(b)]) as u32);
         });
         offsets.shrink_to_fit();
-        let cholesky = SparseCholesky::in_given_order(pattern)?;
-        Ok(Self { surface, cholesky, place, offsets, pulls })
+        Ok(Self { surface, matrix, offsets, pulls })
     }
 
     /// Number of stored values of the factor.
     pub(crate) fn factor_len(&self) -> usize {
-        self.cholesky.factor_len()
+        self.matrix.factor_len()
     }
 
     /// `A x` for the matrix with these values.
     #[cfg(test)]
     pub(crate) fn multiply(&self, values: &[f64], x: &[f64]) -> Vec<f64> {
-        let mut image = vec![0.0; x.len()];
-        let mut placed = vec![0.0; x.len()];
-        self.place.iter().zip(x).for_each(|(&p, &x)| placed[p as usize] = x);
-        self.cholesky.pattern().multiply(values, &placed, &mut image);
-        self.place.iter().map(|&p| image[p as usize]).collect()
+        self.matrix.multiply(values, x)
     }
 
     /// Assembles and factors the metric at `positions`; false if it was stopped before the end.
@@ -89,17 +80,10 @@ impl MetricAssembly {
         if let Some(extra) = extra {
             self.add_extra(extra, freedom, positions, &mut values);
         }
-        // Keeps unknowns that nothing sees from making the matrix singular.
-        let starts = self.cholesky.pattern().column_starts();
-        let size = freedom.len();
-        let trace: f64 = (0..size).map(|j| values[starts[j]]).sum();
-        for j in 0..size {
-            values[starts[j]] += 1e-12 * trace / size as f64;
-        }
         if stop() {
             return Ok(false);
         }
-        self.cholesky.factor(&values)?;
+        self.matrix.factor(&mut values, UNSEEN)?;
         Ok(true)
     }
 
@@ -113,7 +97,7 @@ impl MetricAssembly {
         mixture: &Mixture,
         stop: Stop<'_>,
     ) -> Option<Vec<f64>> {
-        let mut values = vec![0.0; self.cholesky.pattern().len()];
+        let mut values = vec![0.0; self.matrix.len()];
         let mut next_pair = 0;
         let add = &mut |matrix: &Matrix<'_>| {
             next_pair = self.scatter(matrix, freedom, next_pair, &mut values);
@@ -134,17 +118,15 @@ impl MetricAssembly {
         positions: &[f64],
         values: &mut [f64],
     ) {
-        let pattern = self.cholesky.pattern();
         extra.quadratic_models(positions, &mut |columns, _, hessian| {
             for (k, &column) in columns.iter().enumerate() {
                 for (i, a) in unknowns_of(freedom, column) {
-                    let row = self.place[i] as usize;
+                    let row = self.matrix.place(i);
                     for (l, &other) in columns.iter().enumerate() {
                         let h = hessian[k * columns.len() + l];
                         for (j, b) in unknowns_of(freedom, other) {
-                            let column = self.place[j] as usize;
-                            if row >= column
-                                && let Some(slot) = pattern.slot(row, column)
+                            if row >= self.matrix.place(j)
+                                && let Some(slot) = self.matrix.slot(i, j)
                             {
                                 values[slot] += a * b * h;
                             }
@@ -156,10 +138,7 @@ impl MetricAssembly {
     }
 
     pub(crate) fn solve_in_place(&self, rhs: &mut [f64]) {
-        let mut placed = vec![0.0; rhs.len()];
-        self.place.iter().zip(&*rhs).for_each(|(&p, &x)| placed[p as usize] = x);
-        self.cholesky.solve_in_place(&mut placed);
-        self.place.iter().zip(rhs).for_each(|(&p, x)| *x = placed[p as usize]);
+        self.matrix.solve_in_place(rhs);
     }
 
     fn scatter(
@@ -169,21 +148,21 @@ impl MetricAssembly {
         mut next_pair: usize,
         values: &mut [f64],
     ) -> usize {
-        let starts = self.cholesky.pattern().column_starts();
+        let starts = self.matrix.column_starts();
         for (p, &a) in controls.iter().enumerate() {
             let a = a as usize;
             let rows = freedom.dim[a] as usize;
             if rows == 0 {
                 continue;
             }
-            let i0 = self.place[freedom.start[a] as usize] as usize;
+            let i0 = self.matrix.place(freedom.start[a] as usize);
             for (q, &b) in controls.iter().enumerate() {
                 let b = b as usize;
                 let columns = freedom.dim[b] as usize;
                 if columns == 0 {
                     continue;
                 }
-                let j0 = self.place[freedom.start[b] as usize] as usize;
+                let j0 = self.matrix.place(freedom.start[b] as usize);
                 if i0 < j0 {
                     continue;
                 }
@@ -216,14 +195,14 @@ impl MetricAssembly {
     }
 }
 
-/// Structure of the matrix with the unknowns in the order of elimination, and where each comes.
-fn eliminated_pattern(
+/// The structure of the matrix: a block for the unknowns of every vertex.
+fn structure(
     surface: &SurfaceMatrix,
     evaluator: &SurfaceEnergy,
     freedom: &Freedom,
     pulls: &[Pull],
     extra: Option<&Problem<'_>>,
-) -> Result<(SymmetricPattern, Vec<u32>), SolverError> {
+) -> Result<SparseMetric, SolverError> {
     let (block_of, blocks) = freedom.blocks();
     let clique = |controls: &mut dyn Iterator<Item = u32>| -> Vec<u32> {
         let mut met: Vec<u32> =
@@ -236,47 +215,25 @@ fn eliminated_pattern(
     let pulled = pulls.iter().map(|p| clique(&mut p.stencil.iter().map(|&(v, _)| v)));
     let added = extra.into_iter().flat_map(Problem::elements);
     let added = added.map(|columns| clique(&mut columns.iter().map(|&c| (c / 3) as u32)));
-    let coarse = SymmetricPattern::from_cliques(blocks.len(), coupled.chain(pulled).chain(added));
-    let mut place = vec![0; freedom.len()];
-    let mut next = 0;
-    for block in SparseCholesky::elimination_order(&coarse)? {
-        let (start, dim) = blocks[block];
-        for unknown in &mut place[start..start + dim] {
-            *unknown = next;
-            next += 1;
-        }
-    }
-    let unknowns = |block: usize| {
-        let (start, dim) = blocks[block];
-        (0..dim).map(move |k| start + k)
-    };
-    let entries = (0..blocks.len()).flat_map(|b| {
-        let rows = &coarse.rows()[coarse.column_starts()[b]..coarse.column_starts()[b + 1]];
-        rows.iter().flat_map(move |&a| {
-            unknowns(a as usize).flat_map(move |i| unknowns(b).map(move |j| (i, j)))
-        })
-    });
-    let placed = entries.map(|(i, j)| (place[i] as usize, place[j] as usize));
-    let pattern = SymmetricPattern::new(freedom.len(), placed)?;
-    Ok((pattern, place))
+    SparseMetric::new(&blocks, coupled.chain(pulled).chain(added))
 }
 
 // Ordered pairs of control points that have unknowns, the first one's not eliminated before the
-// second one's: the places of their first unknowns.
+// second one's: their first unknowns.
 fn for_pairs<'a>(
     cliques: impl Iterator<Item = &'a [u32]>,
     freedom: &Freedom,
-    place: &[u32],
+    matrix: &SparseMetric,
     mut visit: impl FnMut(usize, usize),
 ) {
     let first = |v: u32| {
         let v = v as usize;
-        (freedom.dim[v] > 0).then(|| place[freedom.start[v] as usize] as usize)
+        (freedom.dim[v] > 0).then(|| freedom.start[v] as usize)
     };
     for controls in cliques {
         for a in controls.iter().filter_map(|&a| first(a)) {
             for b in controls.iter().filter_map(|&b| first(b)) {
-                if a >= b {
+                if matrix.place(a) >= matrix.place(b) {
                     visit(a, b);
                 }
             }

@@ -45,8 +45,8 @@
 //! - [`Run`] steps once at a time by Levenberg-Marquardt, guided projection or Gauss-Newton
 //!   ([`Options`]); [`solve`] does it to the end. An [`Observer`] sees every step, can stop it and
 //!   keeps its [`Checkpoint`]; a [`Report`] tells the energy of every term at every iteration.
-//! - The same family on other models: [`damped_step`] (damping per group), [`lbfgs`],
-//!   and [`Rounds`] of it with a new metric each.
+//! - The same family on other models: [`DampedRun`] (damping per group, matrix-free or eliminated
+//!   models), [`lbfgs`], and [`Rounds`] of it with a new metric each.
 //! - Results do not depend on the number of threads, bit for bit.
 //!
 //! Without the default feature `sparse` there is the band factorisation only, and no faer.
@@ -56,6 +56,7 @@ mod blocks;
 mod check;
 mod checkpoint;
 mod clock;
+mod damped_run;
 mod damping;
 mod elements;
 mod error;
@@ -83,6 +84,7 @@ pub use block::{EnergyBlock, ResidualBlock};
 pub use blocks::{Closeness, DualBlock, ElementFunction, NumericBlock};
 pub use check::{DerivativeCheck, check_gradient, check_jacobian};
 pub use checkpoint::{Checkpoint, Fingerprint};
+pub use damped_run::{DampedOptions, DampedRun, Descending};
 pub use damping::DampingRule;
 pub use elements::Elements;
 pub use error::{Quantity, SolverError};
@@ -92,15 +94,15 @@ pub use lbfgs::{Euclidean, LbfgsOptions, Metric, Objective, lbfgs};
 pub use least_squares::{Run, Step, StepModel, System, Triplets, solve, solve_observed};
 pub use line_search::LineSearch;
 pub use linear::{
-    BandCholesky, CgOptions, CgReport, ConjugateGradients, LinearOperator, Preconditioner,
-    SymmetricPattern,
+    BandCholesky, CgOptions, CgReport, ConjugateGradients, Factorization, LinearOperator,
+    Preconditioner, SymmetricPattern,
 };
 #[cfg(feature = "sparse")]
-pub use linear::{MultifrontalCholesky, SparseCholesky};
+pub use linear::{MultifrontalCholesky, SparseCholesky, SparseMetric, solve_rows};
 #[cfg(feature = "sparse")]
 pub use min_norm::{MinNormProjection, ProjectionOptions};
 pub use observer::{Observer, Progress};
-pub use options::{Factorization, Method, Options, Regularization};
+pub use options::{Method, Options, Regularization};
 pub use problem::{BlockId, Problem};
 #[cfg(feature = "sparse")]
 pub use qp::{BoundedQp, SparseQp};
@@ -110,5 +112,5 @@ pub use report::{IterationRecord, Report, Status, Term, Timings};
 pub use rounds::{Renewed, RoundOptions, Rounds};
 pub use rows::Rows;
 pub use schedule::{Extra, RunReport, Stage, StageReport};
-pub use trust_region::{Accepted, Attempt, DampedModel, DampingPolicy, Verdict, damped_step};
+pub use trust_region::{Attempt, DampedModel, DampingPolicy, Verdict};
 pub use variables::{Group, Variables};

@@ -2,6 +2,7 @@
 
 use crate::damping::DampingRule;
 use crate::error::SolverError;
+use crate::linear::Factorization;
 
 /// How a step is made from the linearised problem.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -33,23 +34,6 @@ pub enum Regularization {
     /// By the square of this weight of the distance to the last iterate, in units of the unknowns'
     /// scale: `(A + ε² I) s = −g`.
     Constant(f64),
-}
-
-/// Which factorisation the normal equations get.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-#[non_exhaustive]
-pub enum Factorization {
-    /// Nested dissection if the problem has [runs](crate::Variables::set_runs), else band or sparse,
-    /// whichever the structure makes cheaper.
-    #[default]
-    Auto,
-    /// Our band Cholesky, in the caller's order or reverse Cuthill-McKee.
-    Band,
-    /// faer's supernodal Cholesky in approximate minimum degree order.
-    Sparse,
-    /// Our multifrontal Cholesky in nested dissection order; needs
-    /// [runs](crate::Variables::set_runs), else as `Auto`.
-    Dissection,
 }
 
 /// Settings of a least-squares solve. The defaults suit every problem of the published test sets

@@ -54,11 +54,11 @@ pub trait DampingPolicy<M: ?Sized> {
 
 /// A step that was accepted.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Accepted {
+pub(crate) struct Accepted {
     /// The step.
-    pub attempt: Attempt,
+    pub(crate) attempt: Attempt,
     /// Attempts it took, this one included: each is one factorisation.
-    pub attempts: usize,
+    pub(crate) attempts: usize,
 }
 
 /// Tries steps until one is accepted, or a status says why none is. Between two attempts the
@@ -66,7 +66,7 @@ pub struct Accepted {
 ///
 /// # Errors
 /// Those of the model.
-pub fn damped_step<M: DampedModel + ?Sized>(
+pub(crate) fn damped_step<M: DampedModel + ?Sized>(
     model: &mut M,
     policy: &mut (impl DampingPolicy<M> + ?Sized),
     damping: &mut [f64],

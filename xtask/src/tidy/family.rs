@@ -8,9 +8,6 @@ use std::path::{Path, PathBuf};
 const METHODS: &[&str] =
     &["weingarten", "hyperbolic-nets", "curvature-variation", "asymptotic-bezier", "paneling"];
 
-/// Methods that are not yet of the family; this list may only become shorter.
-const EXCEPTED: &[&str] = &["hyperbolic-nets", "curvature-variation", "paneling"];
-
 /// What the front page of a method exports.
 const EXPORTS: &[&str] =
     &["Error", "Options", "Solution", "blocks", "problem", "solve", "solve_with", "variables"];
@@ -20,7 +17,6 @@ const STEPPING: &[&str] = &[
     "BandCholesky",
     "MultifrontalCholesky",
     "SparseCholesky",
-    "SymmetricPattern",
     "damped_step",
     "projection_step",
     "stepped_into",
@@ -30,14 +26,13 @@ const STEPPING: &[&str] = &[
 pub(crate) fn check(faults: &mut Vec<String>) -> Outcome {
     for method in METHODS {
         let folder = root().join("crates").join(method);
-        let mut found = Vec::new();
         if !read(&folder.join("Cargo.toml"))?.contains("\ngp-solver") {
-            found.push(format!("{method} does not depend on gp-solver"));
+            faults.push(format!("{method} does not depend on gp-solver"));
         }
         let front = read(&folder.join("src/lib.rs"))?;
         let words = tokens(&front);
         for name in EXPORTS.iter().filter(|name| !words.contains(name)) {
-            found.push(format!("{method} does not export `{name}` at its root"));
+            faults.push(format!("{method} does not export `{name}` at its root"));
         }
         for path in sources(&folder.join("src"))? {
             if path.ends_with("tests.rs") {
@@ -45,16 +40,9 @@ pub(crate) fn check(faults: &mut Vec<String>) -> Outcome {
             }
             let text = read(&path)?;
             let shown = path.strip_prefix(root()).unwrap_or(&path).display().to_string();
-            found.extend(
+            faults.extend(
                 steps(&text).map(|name| format!("{shown}: {name} is the solver's to call")),
             );
-        }
-        match (EXCEPTED.contains(method), found.is_empty()) {
-            (false, _) => faults.extend(found),
-            (true, true) => {
-                faults.push(format!("{method} is of the family; take it off the list in tidy"));
-            }
-            (true, false) => {}
         }
     }
     Ok(())

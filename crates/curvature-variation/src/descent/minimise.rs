@@ -1,15 +1,16 @@
 //! The phases of a level: Gauss-Newton steps, then rounds of L-BFGS.
 
+use std::cell::RefCell;
 use std::time::Instant;
 
 use super::conditioned::Conditioned;
-use super::newton::newton_step;
+use super::newton::{GainRatio, NewtonModel, Shared};
 use super::rounds::{DAMPING, Descent, round_options};
 use crate::options::Method;
 use crate::status::status_of;
 use gp_solver::{
-    Checkpoint, IterationRecord, Observer, Progress, Report, Rounds, SolverError, Stage, Status,
-    Step,
+    Checkpoint, DampedOptions, DampedRun, IterationRecord, Observer, Progress, Report, Rounds,
+    SolverError, Stage, Status, Step,
 };
 
 /// The first damping of Gauss-Newton steps, which open a level.
@@ -180,48 +181,61 @@ fn newton(
     let (steps, tolerance) = plan.opening();
     let is_all = plan.method == Method::GaussNewton;
     let after = if is_all { Phase::Done } else { Phase::Rounds };
+    // An energy may be negative; only the gain tells.
+    let options =
+        DampedOptions { exact: f64::NEG_INFINITY, stall: tolerance, ..Default::default() };
+    let observer = RefCell::new(observer);
+    let mut run = DampedRun::new(&[state.damping]);
     while state.report.iterations < steps {
-        let damping = state.damping;
-        let step = newton_step(of, &mut state.y, &mut state.damping, observer)?;
-        state.report.evaluations += step.evaluations;
-        state.report.factorizations += step.factorizations;
-        if step.factorizations > 0 {
-            state.report.gradient_norm = step.gradient_norm;
-        }
-        let energy = match step.after {
-            Ok(energy) => energy,
-            Err(status) => {
-                state.report.status = status;
-                if status != Status::Interrupted {
-                    state.phase = after;
-                }
-                return Ok(());
-            }
+        let known = run.history().len().max(1);
+        let mut model = NewtonModel::new(of, &mut state.y, Shared(&observer));
+        let mut policy = GainRatio::default();
+        let ended = match run.step(&mut model, &mut policy, &options, &mut Shared(&observer))? {
+            Step::Taken => None,
+            Step::Ended(status) => Some(status),
         };
+        let NewtonModel { before, factorizations, evaluations, gradient_norm, fault, .. } = model;
+        if let Some(fault) = fault {
+            return Err(fault);
+        }
+        state.report.evaluations += evaluations;
+        state.report.factorizations += factorizations;
+        if factorizations > 0 {
+            state.report.gradient_norm = gradient_norm;
+        }
+        if run.history().len() == known {
+            let status = ended.unwrap_or(Status::Stalled);
+            state.report.status = status;
+            if status != Status::Interrupted {
+                state.phase = after;
+            }
+            return Ok(());
+        }
+        let energy = run.history()[known];
+        let damping = std::mem::replace(&mut state.damping, run.damping()[0]);
         state.report.iterations += 1;
-        let gain = step.before - energy;
         let record = IterationRecord {
             energy,
-            decrease: gain,
+            decrease: before - energy,
             damping,
-            gradient_norm: step.gradient_norm,
-            factorizations: step.factorizations,
+            gradient_norm,
+            factorizations,
             ..blank()
         };
-        state.record(step.before, record);
+        state.record(before, record);
         state.report.damping = state.damping;
         state.report.status = Status::IterationLimit;
-        let is_over = gain < tolerance * energy.abs();
-        if is_over {
+        if ended.is_some() {
             (state.report.status, state.phase) = (Status::Converged, after);
         }
+        let mut observer = observer.borrow_mut();
         observer.checkpoint(&|| state.save(Checkpoint::new("", 0, stage.number, 0)));
         let progress = Progress {
             stage,
             iteration: state.report.iterations,
             max_iterations: plan.iterations,
             energy,
-            gradient_norm: step.gradient_norm,
+            gradient_norm,
             x: &state.y,
             system: None,
         };
@@ -229,7 +243,7 @@ fn newton(
             state.report.status = Status::Interrupted;
             return Ok(());
         }
-        if is_over {
+        if ended.is_some() {
             return Ok(());
         }
     }

@@ -4,8 +4,7 @@ use std::cell::RefCell;
 
 use super::conditioned::Conditioned;
 use gp_solver::{
-    Attempt, DampedModel, DampingPolicy, Metric, Observer, SolverError, Status, Verdict,
-    damped_step,
+    Attempt, DampedModel, DampingPolicy, Descending, Metric, Observer, SolverError, Status, Verdict,
 };
 use numerics::dot;
 
@@ -21,9 +20,9 @@ const REFUSED: f64 = 4.0;
 /// Least damping.
 const LEAST: f64 = 1e-9;
 
-/// The observer of a step, asked by the loop and by the model.
+/// The observer of a run, asked by the solver's loop and by the model.
 #[derive(Clone, Copy)]
-struct Shared<'s, 'o>(&'s RefCell<&'o mut dyn Observer>);
+pub(super) struct Shared<'s, 'o>(pub(super) &'s RefCell<&'o mut dyn Observer>);
 
 impl Observer for Shared<'_, '_> {
     fn stop_requested(&mut self) -> bool {
@@ -31,87 +30,81 @@ impl Observer for Shared<'_, '_> {
     }
 }
 
-/// One Gauss-Newton step from `from`.
-struct NewtonStep<'n, 'a, 's, 'o> {
+/// A level at `y`, for one Gauss-Newton step.
+pub(super) struct NewtonModel<'n, 'a, 's, 'o> {
     of: &'n mut Conditioned<'a>,
     observer: Shared<'s, 'o>,
-    from: &'n [f64],
+    y: &'n mut [f64],
     energy: f64,
+    /// The energy where the step begins.
+    pub(super) before: f64,
     gradient: Vec<f64>,
     rows: Vec<Vec<f64>>,
     trial: Vec<f64>,
     trial_gradient: Vec<f64>,
     value: f64,
-    factorizations: usize,
-    evaluations: usize,
-    gradient_norm: f64,
-    /// A matrix that nothing mends.
-    fault: Option<SolverError>,
-}
-
-/// What became of a step.
-pub(super) struct Outcome {
-    /// Energy where it began, and where it leads if it is taken.
-    pub(super) before: f64,
-    pub(super) after: Result<f64, Status>,
-    pub(super) gradient_norm: f64,
+    /// Counts of the step.
     pub(super) factorizations: usize,
     pub(super) evaluations: usize,
+    /// `√(gᵀM⁻¹g)` of the last attempt.
+    pub(super) gradient_norm: f64,
+    /// A matrix that nothing mends.
+    pub(super) fault: Option<SolverError>,
 }
 
-/// Makes a damped step from `y`, which then holds its end, and adjusts the damping.
-pub(super) fn newton_step(
-    of: &mut Conditioned<'_>,
-    y: &mut [f64],
-    damping: &mut f64,
-    observer: &mut dyn Observer,
-) -> Result<Outcome, SolverError> {
-    of.energy.renormalise(y);
-    of.energy.set_barrier(y);
-    of.energy.refresh(y);
-    let mut gradient = vec![0.0; y.len()];
-    let energy = of.energy.value(y, &mut gradient);
-    let rows = of.condition_rows(y);
-    let from = y.to_vec();
-    let shared = RefCell::new(observer);
-    let mut step = NewtonStep {
-        of,
-        observer: Shared(&shared),
-        from: &from,
-        energy,
-        gradient,
-        rows,
-        trial: from.clone(),
-        trial_gradient: vec![0.0; y.len()],
-        value: energy,
-        factorizations: 0,
-        evaluations: 1,
-        gradient_norm: f64::NAN,
-        fault: None,
-    };
-    let mut policy = GainRatio { tries: 0 };
-    let mut dampings = [*damping];
-    let taken = damped_step(&mut step, &mut policy, &mut dampings, &mut Shared(&shared))?;
-    [*damping] = dampings;
-    if let Some(fault) = step.fault {
-        return Err(fault);
+impl<'n, 'a, 's, 'o> NewtonModel<'n, 'a, 's, 'o> {
+    pub(super) fn new(
+        of: &'n mut Conditioned<'a>,
+        y: &'n mut [f64],
+        observer: Shared<'s, 'o>,
+    ) -> Self {
+        let [gradient, trial, trial_gradient] = std::array::from_fn(|_| vec![0.0; y.len()]);
+        Self {
+            gradient,
+            trial,
+            trial_gradient,
+            of,
+            observer,
+            y,
+            energy: f64::NAN,
+            before: f64::NAN,
+            rows: Vec::new(),
+            value: f64::NAN,
+            factorizations: 0,
+            evaluations: 0,
+            gradient_norm: f64::NAN,
+            fault: None,
+        }
     }
-    if taken.is_ok() {
-        y.copy_from_slice(&step.trial);
-    }
-    Ok(Outcome {
-        before: energy,
-        after: taken.map(|_| step.value),
-        gradient_norm: step.gradient_norm,
-        factorizations: step.factorizations,
-        evaluations: step.evaluations,
-    })
 }
 
-impl DampedModel for NewtonStep<'_, '_, '_, '_> {
+impl Descending for NewtonModel<'_, '_, '_, '_> {
+    fn energy(&self) -> f64 {
+        self.energy
+    }
+
+    fn linearize(&mut self, _: &mut dyn Observer) -> Result<Result<(), Status>, SolverError> {
+        self.of.energy.renormalise(self.y);
+        self.of.energy.set_barrier(self.y);
+        self.of.energy.refresh(self.y);
+        self.energy = self.of.energy.value(self.y, &mut self.gradient);
+        self.before = self.energy;
+        self.rows = self.of.condition_rows(self.y);
+        (self.factorizations, self.evaluations) = (0, 1);
+        self.gradient_norm = f64::NAN;
+        Ok(Ok(()))
+    }
+
+    fn take(&mut self) {
+        self.y.copy_from_slice(&self.trial);
+        self.energy = self.value;
+    }
+}
+
+impl DampedModel for NewtonModel<'_, '_, '_, '_> {
     fn attempt(&mut self, damping: &[f64]) -> Result<Attempt, SolverError> {
         self.of.keep(Vec::new(), false);
-        match self.of.factor(self.from, true, damping[0], &mut self.observer) {
+        match self.of.factor(self.y, true, damping[0], &mut self.observer) {
             Ok(Ok(made)) => self.factorizations += made,
             // The loop asks again before the next attempt and ends.
             Ok(Err(_)) => return Ok(Attempt { decrease: f64::NAN, ..Attempt::default() }),
@@ -127,7 +120,7 @@ impl DampedModel for NewtonStep<'_, '_, '_, '_> {
         // With a positive definite model of Hessian M the model's gain is gᵀM⁻¹g/2.
         let gain = 0.5 * dot(&self.gradient, &step);
         self.gradient_norm = (2.0 * gain).max(0.0).sqrt();
-        for ((y, &y0), s) in self.trial.iter_mut().zip(self.from).zip(&step) {
+        for ((y, &y0), s) in self.trial.iter_mut().zip(&*self.y).zip(&step) {
             *y = y0 - s;
         }
         self.value = self.of.energy.value(&self.trial, &mut self.trial_gradient);
@@ -141,7 +134,8 @@ impl DampedModel for NewtonStep<'_, '_, '_, '_> {
 }
 
 /// Damping by the ratio of the gain to the one foreseen.
-struct GainRatio {
+#[derive(Default)]
+pub(super) struct GainRatio {
     tries: usize,
 }
 

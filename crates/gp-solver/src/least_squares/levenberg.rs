@@ -1,6 +1,5 @@
 //! Levenberg-Marquardt's judgement of steps.
 
-use super::run::ALIGNED;
 use super::system::{StepModel, System};
 use crate::damping::DampingRule;
 use crate::error::SolverError;
@@ -8,6 +7,9 @@ use crate::options::Options;
 use crate::report::Status;
 use crate::trust_region::{Attempt, DampedModel, DampingPolicy, Verdict};
 
+/// Largest cosine between the residual and a column of the Jacobian at which a step that is short
+/// only because it is damped may count as convergence.
+pub(super) const ALIGNED: f64 = 1e-2;
 /// Damping beyond which no step is worth trying.
 const MAX_DAMPING: f64 = 1e16;
 /// Damping that mends a singular matrix at the least.

@@ -5,8 +5,7 @@ use std::ops::Range;
 use super::gram::{AddGram, Run, Targets};
 use crate::elements::Elements;
 use crate::error::SolverError;
-use crate::linear::{Factor, Storage};
-use crate::options::Factorization;
+use crate::linear::{Factor, Factorization, Storage};
 use crate::problem::Problem;
 
 /// Mark of a fixed unknown.

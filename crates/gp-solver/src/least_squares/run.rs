@@ -2,7 +2,7 @@
 
 use std::ops::ControlFlow;
 
-use super::levenberg::{Levenberg, SystemModel};
+use super::levenberg::{ALIGNED, Levenberg, SystemModel};
 use super::system::{StepModel, System};
 use crate::checkpoint::Checkpoint;
 use crate::clock::Instant;
@@ -14,9 +14,6 @@ use crate::report::{IterationRecord, Report, Status, Timings};
 use crate::schedule::Stage;
 use crate::trust_region;
 
-/// Largest cosine between the residual and a column of the Jacobian at which a step that is short
-/// only because it is damped may count as convergence.
-pub(super) const ALIGNED: f64 = 1e-2;
 /// A full step is not shortened below this share.
 const SHORTEST: f64 = 1e-4;
 /// By how much of it the energy may rise under a full or shortened step: rounding.

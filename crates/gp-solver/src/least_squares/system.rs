@@ -4,8 +4,7 @@ use super::normal::{NormalPlan, Scratch};
 use crate::block::{Block, ResidualBlock};
 use crate::clock::Instant;
 use crate::error::{Quantity, SolverError};
-use crate::linear::Factor;
-use crate::options::Factorization;
+use crate::linear::{Factor, Factorization};
 use crate::problem::{BlockId, Problem, Seen, Slot};
 use crate::report::{Term, Timings};
 

@@ -5,7 +5,6 @@ use super::{BandCholesky, SymmetricPattern};
 #[cfg(feature = "sparse")]
 use super::{MultifrontalCholesky, SparseCholesky};
 use crate::error::SolverError;
-use crate::options::Factorization;
 
 /// Speeds of the two factorisations (flops per second) their costs are compared with. Only the
 /// ratio matters; measured on AVX2 and AVX-512 machines.
@@ -20,6 +19,23 @@ const SPARSE_OVERHEAD: f64 = 2e-9;
 const DENSE_BAND: f64 = 0.25;
 /// Systems this small are factored as dense.
 const SMALL: usize = 64;
+
+/// Which factorisation the normal equations get.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum Factorization {
+    /// Nested dissection if the problem has [runs](crate::Variables::set_runs), else band or sparse,
+    /// whichever the structure makes cheaper.
+    #[default]
+    Auto,
+    /// Our band Cholesky, in the caller's order or reverse Cuthill-McKee.
+    Band,
+    /// faer's supernodal Cholesky in approximate minimum degree order.
+    Sparse,
+    /// Our multifrontal Cholesky in nested dissection order; needs
+    /// [runs](crate::Variables::set_runs), else as `Auto`.
+    Dissection,
+}
 
 /// A factorisation that fits the structure.
 pub(crate) enum Factor {

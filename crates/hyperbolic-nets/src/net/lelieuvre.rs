@@ -2,10 +2,9 @@
 
 use super::differences::second_differences;
 use super::quad_net::{Family, QuadNet};
-use super::rows::solve_rows;
 use crate::Error;
 use geom_core::DVec3;
-use gp_solver::SolverError;
+use gp_solver::{SolverError, solve_rows};
 
 /// First guess of the normals, and the sign of every edge.
 #[derive(Clone, Debug, PartialEq)]

@@ -9,7 +9,6 @@ mod join;
 mod lelieuvre;
 mod patch;
 mod quad_net;
-mod rows;
 mod sample;
 mod shape;
 

@@ -1,10 +1,9 @@
 //! Shape parameters of the patches over a given asymptotic net (Shi et al. 2014, §3.2, step 2).
 
 use super::quad_net::QuadNet;
-use super::rows::solve_rows;
 use crate::Error;
 use geom_core::DVec3;
-use gp_solver::choices;
+use gp_solver::{choices, solve_rows};
 use serde::{Deserialize, Serialize};
 use std::collections::VecDeque;
 

@@ -13,8 +13,6 @@ use numerics::{PIVOT_RATIO, add_normal_row, factor_semidefinite, solve_semidefin
 
 /// A round that lowers the energy by less than this share ends the alternation.
 pub(crate) const STALL: f64 = 1e-2;
-/// A mold whose step lowers the energy of its panels by less than this share stays as it is.
-const MOLD_STALL: f64 = 1e-3;
 /// Rounds that alternate, before molds and poses move together.
 const ALTERNATING: usize = 1;
 /// Gauss-Newton steps of a registration per round.
@@ -88,24 +86,14 @@ impl Fit {
     ) -> Option<()> {
         let items = damping.iter_mut().collect();
         let moved = pulse.map_molds(&self.members, items, |m, damping: &mut Option<f64>| {
-            let step = damping.as_mut().and_then(|d| mold_step::step(set, self, m, d));
-            if step.is_none() {
-                *damping = None;
-            }
-            step
+            mold_step::step(set, self, m, damping)
         })?;
         for (m, moved) in moved.into_iter().enumerate() {
             let Some(moved) = moved else { continue };
             self.molds[m] = moved.mold;
-            let (mut before, mut after) = (0.0, 0.0);
             for (&p, (pose, energy)) in self.members[m].iter().zip(moved.panels) {
-                before += self.energies[p];
-                after += energy;
                 self.poses[p] = pose;
                 self.energies[p] = energy;
-            }
-            if after > (1.0 - MOLD_STALL) * before {
-                damping[m] = None;
             }
         }
         Some(())

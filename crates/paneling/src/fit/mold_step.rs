@@ -10,10 +10,15 @@ use crate::fit::retraction::moved_on;
 use crate::fit::state::Fit;
 use crate::layout::panels::{PanelSet, Pose};
 use crate::mold::shape::{MAX_PARAMETERS, Mold};
-use gp_solver::{Attempt, DampedModel, DampingPolicy, SolverError, Status, Verdict, damped_step};
+use gp_solver::{
+    Attempt, DampedModel, DampedOptions, DampedRun, DampingPolicy, Descending, Observer,
+    SolverError, Status, Step, Verdict,
+};
 use numerics::{PIVOT_RATIO, factor_semidefinite, solve_semidefinite};
 use rayon::prelude::*;
 
+/// A mold whose step lowers the energy of its panels by less than this share stays as it is.
+const STALL: f64 = 1e-3;
 /// Tries per step.
 const TRIES: usize = 4;
 /// How the damping grows from one try to the next, and shrinks after a step.
@@ -32,23 +37,34 @@ pub(crate) struct Moved {
     pub(crate) panels: Vec<(Pose, f64)>,
 }
 
-/// A step of mold `m` that lowers the energy of its panels, or `None` if none was found.
-pub(crate) fn step(set: &PanelSet, fit: &Fit, m: usize, damping: &mut f64) -> Option<Moved> {
+/// A step of mold `m` that lowers the energy of its panels, or `None` if none was found. `damping`
+/// is that of its next step; `None` once there is none or one has changed too little.
+pub(crate) fn step(
+    set: &PanelSet,
+    fit: &Fit,
+    m: usize,
+    damping: &mut Option<f64>,
+) -> Option<Moved> {
+    let before = fit.members[m].iter().map(|&p| fit.energies[p]).sum();
+    let mut model = MoldModel { set, fit, m, blocks: Vec::new(), energy: before, moved: None };
+    // A run of this mold alone, beside those of the other molds.
+    let mut run = DampedRun::new(&[(*damping)?]);
+    let options = DampedOptions { stall: STALL, exact: f64::NEG_INFINITY, ..Default::default() };
+    let ended = run.step(&mut model, &mut Tenfold { tries: 0 }, &options, &mut ());
+    *damping = (ended == Ok(Step::Taken)).then(|| run.damping()[0]);
+    model.moved.filter(|_| run.history().len() > 1)
+}
+
+/// Normal equations of every panel in its pose and the mold's parameters.
+fn linearized(set: &PanelSet, fit: &Fit, m: usize) -> Vec<(Matrix, Row)> {
     let members = &fit.members[m];
-    let blocks: Vec<(Matrix, Row)> = members
+    members
         .par_iter()
         .with_min_len(32)
         .map_init(Vec::new, |rows, &p| {
             design_block(set, p, &fit.molds[m], &fit.poses[p], fit.slope_weight, rows)
         })
-        .collect();
-    let before = members.iter().map(|&p| fit.energies[p]).sum();
-    let mut model = MoldModel { set, fit, m, blocks, before, moved: None };
-    let mut policy = Tenfold { tries: 0 };
-    // The dampings of this mold alone, in a loop of its own beside those of the other molds.
-    let damping = std::slice::from_mut(damping);
-    let accepted = damped_step(&mut model, &mut policy, damping, &mut ()).ok()?.is_ok();
-    model.moved.filter(|_| accepted)
+        .collect()
 }
 
 /// A mold and its panels, linearised.
@@ -57,8 +73,25 @@ struct MoldModel<'m> {
     fit: &'m Fit,
     m: usize,
     blocks: Vec<(Matrix, Row)>,
-    before: f64,
+    /// Where it stands, or leads once it is taken.
+    energy: f64,
     moved: Option<Moved>,
+}
+
+impl Descending for MoldModel<'_> {
+    fn energy(&self) -> f64 {
+        self.energy
+    }
+
+    fn linearize(&mut self, _: &mut dyn Observer) -> Result<Result<(), Status>, SolverError> {
+        self.blocks = linearized(self.set, self.fit, self.m);
+        Ok(Ok(()))
+    }
+
+    /// The caller puts the step into the fit.
+    fn take(&mut self) {
+        self.energy = self.moved.iter().flat_map(|moved| &moved.panels).map(|p| p.1).sum();
+    }
 }
 
 impl DampedModel for MoldModel<'_> {
@@ -78,7 +111,7 @@ impl DampedModel for MoldModel<'_> {
                 (pose, panel_energy(&trial, fit.slope_weight, &pose, points, normals))
             })
             .collect();
-        let decrease = self.before - panels.iter().map(|p| p.1).sum::<f64>();
+        let decrease = self.energy - panels.iter().map(|p| p.1).sum::<f64>();
         self.moved = Some(Moved { mold: trial, panels });
         // The policy asks only whether the energy falls.
         Ok(Attempt { decrease, ..Attempt::default() })

@@ -113,7 +113,7 @@ mod tests {
             let SeamProblem { assembly, problem } = SeamProblem::new(seams, &fit).unwrap();
             let mut system = System::new(problem, Factorization::Auto).unwrap();
             let energy = system.linearize(&assembly.start()).unwrap();
-            assert_close(2.0 * energy, run.history[0], 1e-11 * run.history[0]);
+            assert_close(2.0 * energy, run.steps.history()[0], 1e-11 * run.steps.history()[0]);
             let side = free.side();
             let size = side.iter().fold(0.0_f64, |m, v| m.max(v.abs()));
             for (position, &unknown) in system.order().iter().enumerate() {

@@ -12,8 +12,8 @@ use crate::pulse::{Pulse, Stop};
 use crate::seam::system::{Solution, System};
 use crate::seam::unknowns::{Seams, parts};
 use gp_solver::{
-    Attempt, ConjugateGradients, DampedModel, DampingPolicy, SolverError, Status, Verdict,
-    damped_step,
+    Attempt, ConjugateGradients, DampedModel, DampedOptions, DampedRun, DampingPolicy, Descending,
+    Observer, SolverError, Status, Step, Verdict,
 };
 
 /// Damping of the first step, a share of the diagonal.
@@ -22,12 +22,8 @@ const FIRST_DAMPING: f64 = 1e-2;
 /// Seam steps between two of them.
 #[derive(Clone, Debug)]
 pub(crate) struct SeamRun {
-    /// Damping of every mold and its panels.
-    pub(crate) damping: Vec<f64>,
-    /// Steps tried, those that were refused included.
-    pub(crate) tries: usize,
-    /// Energy at the start and after every step.
-    pub(crate) history: Vec<f64>,
+    /// Dampings of every mold and its panels, steps tried, energies.
+    pub(crate) steps: DampedRun,
     /// How it ended, once it has.
     pub(crate) status: Option<Status>,
     energy: Energy,
@@ -39,18 +35,18 @@ impl SeamRun {
         assert_eq!(seams.weights.len(), seams.set.seams.len(), "one weight per seam");
         let energy = Energy::new(seams, fit, pulse)?;
         let damping = vec![FIRST_DAMPING; fit.molds.len()];
-        let history = vec![energy.total];
-        Some(Self { damping, tries: 0, history, status: None, energy })
+        let steps = DampedRun::after(damping, 0, vec![energy.total]);
+        Some(Self { steps, status: None, energy })
     }
 
     /// Goes on from a step before; `None` if asked to stop.
     pub(crate) fn resumed(
         seams: Seams<'_>,
         fit: &Fit,
-        (damping, tries, history): (Vec<f64>, usize, Vec<f64>),
+        steps: DampedRun,
         pulse: &Pulse<'_>,
     ) -> Option<Self> {
-        Some(Self { damping, tries, history, ..Self::new(seams, fit, pulse)? })
+        Some(Self { steps, ..Self::new(seams, fit, pulse)? })
     }
 
     /// Takes one step that lowers the energy of `fit`, or sets the status that says why there is
@@ -62,42 +58,24 @@ impl SeamRun {
         solver: &mut ConjugateGradients,
         pulse: &Pulse<'_>,
     ) {
-        if self.energy.total <= EXACT * seams.set.edges.points.len() as f64 {
-            self.status = Some(Status::Converged);
-            return;
-        }
-        if self.tries >= seams.options.steps {
-            self.status = Some(Status::IterationLimit);
-            return;
-        }
-        let Some(system) = System::linearize(seams, fit, pulse) else {
-            self.status = Some(Status::Interrupted);
-            return;
+        let options = DampedOptions {
+            max_attempts: seams.options.steps,
+            exact: EXACT * seams.set.edges.points.len() as f64,
+            stall: seams.options.stall,
         };
-        // A refused step is tried again with more damping on the same linearisation.
-        let mut damping = self.damping.clone();
-        let mut policy = PerMold::default();
         let energy = &self.energy;
-        let mut model = SeamModel { seams, fit, system, energy, solver, pulse, tried: None };
-        let result = damped_step(&mut model, &mut policy, &mut damping, &mut Stop(pulse));
-        let tried = model.tried;
-        let (Ok(Ok(accepted)), Some(tried)) = (&result, tried) else {
-            let status = match result {
-                Ok(Err(status)) => status,
-                _ => Status::Stalled,
-            };
-            self.status = Some(status);
-            return;
-        };
-        let before = self.energy.total;
-        *fit = tried.fit;
-        self.energy = tried.energy;
-        self.damping = damping;
-        self.tries += accepted.attempts;
-        self.history.push(self.energy.total);
-        if self.energy.total > (1.0 - seams.options.stall) * before {
-            self.status = Some(Status::Converged);
+        let mut model =
+            SeamModel { seams, fit, system: None, energy, solver, pulse, tried: None, taken: None };
+        let step = self.steps.step(&mut model, &mut PerMold::default(), &options, &mut Stop(pulse));
+        if let Some(taken) = model.taken {
+            *fit = taken.fit;
+            self.energy = taken.energy;
         }
+        self.status = match step {
+            Ok(Step::Taken) => None,
+            Ok(Step::Ended(status)) => Some(status),
+            Err(_) => Some(Status::Stalled),
+        };
     }
 }
 
@@ -105,12 +83,29 @@ impl SeamRun {
 struct SeamModel<'m, 'o> {
     seams: Seams<'m>,
     fit: &'m Fit,
-    system: System<'m>,
+    system: Option<System<'m>>,
     energy: &'m Energy,
     solver: &'m mut ConjugateGradients,
     pulse: &'m Pulse<'o>,
     /// The last attempt; none if it was interrupted.
     tried: Option<Tried>,
+    /// The attempt that was accepted.
+    taken: Option<Tried>,
+}
+
+impl Descending for SeamModel<'_, '_> {
+    fn energy(&self) -> f64 {
+        self.taken.as_ref().map_or(self.energy.total, |taken| taken.energy.total)
+    }
+
+    fn linearize(&mut self, _: &mut dyn Observer) -> Result<Result<(), Status>, SolverError> {
+        self.system = System::linearize(self.seams, self.fit, self.pulse);
+        Ok(self.system.as_ref().map(|_| ()).ok_or(Status::Interrupted))
+    }
+
+    fn take(&mut self) {
+        self.taken = self.tried.take();
+    }
 }
 
 /// Where a step leads.
@@ -124,7 +119,7 @@ struct Tried {
 impl SeamModel<'_, '_> {
     fn try_step(&mut self, damping: &[f64]) -> Option<Tried> {
         let Solution { step, promised, report } =
-            self.system.solve(damping, self.solver, self.pulse);
+            self.system.as_mut()?.solve(damping, self.solver, self.pulse);
         let fit = applied(self.seams.set, self.fit, &step, self.pulse)?;
         let energy = Energy::new(self.seams, &fit, self.pulse)?;
         let (before, cg) = (self.energy.total, report.iterations);

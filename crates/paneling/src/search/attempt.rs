@@ -117,7 +117,7 @@ impl Attempt {
     /// The energy that is being lowered.
     pub(crate) fn energy(&self) -> f64 {
         match &self.phase {
-            Phase::Seams(run) => *run.history.last().unwrap_or(&f64::NAN),
+            Phase::Seams(run) => *run.steps.history().last().unwrap_or(&f64::NAN),
             Phase::General(history, _) => *history.last().unwrap_or(&f64::NAN),
             Phase::Rounds(..) | Phase::Done => *self.fit_history.last().unwrap_or(&self.start),
         }
@@ -156,14 +156,14 @@ impl Attempt {
                 self.begin_seams(setting)
             }
             Phase::Seams(run) => {
-                let taken = run.history.len();
+                let taken = run.steps.history().len();
                 run.step(site.seams(&self.weights), &mut self.fit, solver, pulse);
-                self.steps += run.history.len() - taken;
+                self.steps += run.steps.history().len() - taken;
                 match run.status {
                     None => Ok(Some(())),
                     Some(Status::Interrupted) => Ok(None),
                     Some(status) => {
-                        let history = std::mem::take(&mut run.history);
+                        let history = run.steps.history().to_vec();
                         Ok(self.end_seams(history, status, setting))
                     }
                 }

@@ -248,7 +248,7 @@ impl<'s> Course<'s> {
         let (rounds, steps) = (self.site.options.rounds, self.site.seam.steps);
         let (iteration, max_iterations) = match (stage.name.as_str(), &attempt.phase) {
             ("fit", _) => (attempt.fit_history.len(), rounds),
-            ("seams", Phase::Seams(run)) => (run.history.len() - 1, steps),
+            ("seams", Phase::Seams(run)) => (run.steps.history().len() - 1, steps),
             ("seams", _) => (0, steps),
             ("grid", _) => (attempt.steps, rounds + steps),
             _ => (attempt.steps, rounds + (MENDING_ROUNDS + 1) * steps),

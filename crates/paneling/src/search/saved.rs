@@ -12,7 +12,7 @@ use crate::seam::step::SeamRun;
 use crate::search::attempt::{Attempt, Found, Phase};
 use crate::search::site::Site;
 use glam::{DMat3, DVec3};
-use gp_solver::{Checkpoint, SolverError, Status};
+use gp_solver::{Checkpoint, DampedRun, SolverError, Status};
 
 /// How seam steps end.
 const ENDS: [Status; 3] = [Status::Converged, Status::Stalled, Status::IterationLimit];
@@ -141,7 +141,7 @@ pub(crate) fn put_attempt(to: Checkpoint, attempt: &Attempt) -> Checkpoint {
     };
     let (kind, done, most) = match &attempt.phase {
         Phase::Rounds(alternation, most) => (0, alternation.rounds, *most),
-        Phase::Seams(run) => (1, run.tries, 0),
+        Phase::Seams(run) => (1, run.steps.attempts(), 0),
         Phase::General(..) => (2, 0, 0),
         Phase::Done => (3, 0, 0),
     };
@@ -155,7 +155,7 @@ pub(crate) fn put_attempt(to: Checkpoint, attempt: &Attempt) -> Checkpoint {
             put_bits(to, "energy", energy.as_slice())
         }
         Phase::Seams(run) => {
-            put_bits(put_bits(to, "dampings", &run.damping), "energy", &run.history)
+            put_bits(put_bits(to, "dampings", run.steps.damping()), "energy", run.steps.history())
         }
         Phase::General(history, _) => put_bits(to, "general", history),
         Phase::Done => to,
@@ -183,7 +183,7 @@ pub(crate) fn attempt(
         }
         1 => {
             let damping = some_bits(of, "dampings", fit.molds.len())?;
-            let state = (damping, done, bits(of, "energy")?);
+            let state = DampedRun::after(damping, done, bits(of, "energy")?);
             let run = SeamRun::resumed(site.seams(&weights), &fit, state, pulse);
             let Some(run) = run else { return Ok(Some(None)) };
             Phase::Seams(run)

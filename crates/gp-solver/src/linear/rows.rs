@@ -1,9 +1,22 @@
-//! Sparse linear least squares.
+//! Linear least squares of sparse rows.
 
-use gp_solver::{SolverError, SparseCholesky, SymmetricPattern};
+use super::{SparseCholesky, SymmetricPattern};
+use crate::error::SolverError;
 
-/// Least squares of sparse rows `Σ a_k y_k = b`, with `shift` added to the diagonal.
-pub(crate) fn solve_rows(
+/// The `y` that minimises `Σ (Σ_k a_k y_k − b)² + shift · |y|²` over rows of pairs `(k, a_k)` with
+/// right-hand sides `b`, by the normal equations. A row names an unknown at most once.
+///
+/// ```
+/// let rows = [(vec![(0, 1.0), (1, 1.0)], 3.0), (vec![(0, 1.0), (1, -1.0)], 1.0)];
+/// let y = gp_solver::solve_rows(2, &rows, 0.0)?;
+/// assert!((y[0] - 2.0).abs() < 1e-15 && (y[1] - 1.0).abs() < 1e-15);
+/// # Ok::<(), gp_solver::SolverError>(())
+/// ```
+///
+/// # Errors
+/// [`SolverError::NotPositiveDefinite`] where the rows leave an unknown open and `shift` is zero,
+/// [`SolverError::OutOfMemory`], and an index beyond `unknowns`.
+pub fn solve_rows(
     unknowns: usize,
     rows: &[(Vec<(usize, f64)>, f64)],
     shift: f64,
