@@ -4,11 +4,12 @@ use crate::evaluator::EnergyTable;
 use crate::functional::Functional;
 use crate::metrics::{energies, gauss_bonnet_residual};
 use crate::rules::{Quadrature, gauss_legendre};
-use crate::samples::jet_at;
+use crate::samples::JetTable;
 use geom_core::{CurvatureStatistics, DVec3, PolyMesh};
 use rayon::prelude::*;
 use subdiv_catmull_clark::{
-    Blend, Creases, Patch, SubdivisionError, SubdivisionSurface, refine, refinements_needed,
+    Blend, Creases, Patch, SubdivisionError, SubdivisionSurface, check_valences, refine,
+    refinements_needed,
 };
 
 /// Gauss points per side of a patch for the mean sizes of curvatures.
@@ -60,6 +61,7 @@ pub fn analyze(
     blend: Blend,
     blend_rings: Option<usize>,
 ) -> Result<SurfaceAnalysis, SubdivisionError> {
+    check_valences(mesh)?;
     let mut mesh = mesh.clone();
     for _ in 0..refinements_needed(&mesh, &Creases::none()) {
         // Fails for meshes too large to count only, which the caller's mesh already passed.
@@ -89,17 +91,21 @@ pub fn analyze(
 
 fn statistics(mesh: &PolyMesh, surface: &SubdivisionSurface) -> CurvatureStatistics {
     let rule = gauss_legendre(SAMPLES);
-    let mut parameters: Vec<(f64, f64, f64)> = Vec::new();
+    let mut parameters: Vec<[f64; 2]> = Vec::new();
+    let mut weights: Vec<f64> = Vec::new();
     for &(u, wu) in &rule {
-        parameters.extend(rule.iter().map(|&(v, wv)| (u, v, wu * wv)));
+        parameters.extend(rule.iter().map(|&(v, _)| [u, v]));
+        weights.extend(rule.iter().map(|&(_, wv)| wu * wv));
     }
-    parameters.extend([(0.0, 0.0, 0.0), (1.0, 0.0, 0.0), (1.0, 1.0, 0.0), (0.0, 1.0, 0.0)]);
+    parameters.extend([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]]);
+    weights.extend([0.0; 4]);
     let positions = surface.control_points(mesh.positions());
+    let table = JetTable::new(surface, parameters);
     let parts: Vec<CurvatureStatistics> = surface
         .patches()
         .par_iter()
         .with_min_len(16)
-        .map(|patch| patch_statistics(&positions, surface, patch, &parameters))
+        .map(|patch| patch_statistics(&positions, &table, patch, &weights))
         .collect();
     let mut all = CurvatureStatistics::default();
     parts.iter().for_each(|part| all.merge(part));
@@ -108,13 +114,13 @@ fn statistics(mesh: &PolyMesh, surface: &SubdivisionSurface) -> CurvatureStatist
 
 fn patch_statistics(
     positions: &[DVec3],
-    surface: &SubdivisionSurface,
+    table: &JetTable<'_>,
     patch: &Patch,
-    parameters: &[(f64, f64, f64)],
+    weights: &[f64],
 ) -> CurvatureStatistics {
     let mut out = CurvatureStatistics::default();
-    for &(u, v, weight) in parameters {
-        let jet = jet_at(positions, surface, patch, u, v);
+    for (k, weight) in weights.iter().enumerate() {
+        let jet = table.jet(positions, patch, k);
         let first = jet.first_form();
         let area = weight * (first.e * first.g - first.f * first.f).max(0.0).sqrt();
         out.add_area(area);

@@ -7,7 +7,9 @@ use gp_solver::{
     Euclidean, Extra, LbfgsOptions, Objective, Observer, Problem, Report, RunReport, Stage,
     StageReport, Status, Variables, lbfgs,
 };
-use subdiv_catmull_clark::{Creases, SubdivisionSurface, refine, refinements_needed};
+use subdiv_catmull_clark::{
+    Creases, SubdivisionSurface, check_valences, refine, refinements_needed,
+};
 
 use crate::blocks::{FamilyBlock, SurfaceBlock};
 use crate::error::Error;
@@ -43,6 +45,7 @@ impl Family {
                 return Err(Error::OtherFaces { member: member + 1 });
             }
         }
+        check_valences(&input.mesh)?;
         let levels = refinements_needed(&input.mesh, &Creases::none()) + options.levels;
         let mesh = refined(&input.mesh, levels)?;
         let base = flatten(mesh.positions());

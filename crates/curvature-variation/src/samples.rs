@@ -3,7 +3,7 @@
 use crate::umbilics::{DirectionField, Umbilic};
 use geom_core::{DVec3, PolyMesh, SurfaceJet, ThirdOrder, principal_curvatures};
 use rayon::prelude::*;
-use subdiv_catmull_clark::{Patch, SubdivisionSurface};
+use subdiv_catmull_clark::{BasisId, JetWeights, Patch, SubdivisionSurface};
 
 /// Derivatives next to an extraordinary corner are taken at least this far from it.
 const CORNER: f64 = 2e-3;
@@ -47,10 +47,13 @@ impl SurfaceSamples {
     pub fn new(mesh: &PolyMesh, surface: &SubdivisionSurface, side: usize) -> Self {
         let side = side.max(2);
         let positions = surface.control_points(mesh.positions());
+        let at = |i: usize| i as f64 / (side - 1) as f64;
+        let parameters = (0..side * side).map(|k| [at(k / side), at(k % side)]).collect();
+        let table = JetTable::new(surface, parameters);
         let patches: Vec<PatchSamples> = surface
             .patches()
             .par_iter()
-            .map(|patch| sample_patch(&positions, surface, patch, side))
+            .map(|patch| sample_patch(&positions, &table, patch))
             .collect();
         let mut out = Self::default();
         for patch in &patches {
@@ -135,27 +138,79 @@ pub(crate) fn jet_at(
     u: f64,
     v: f64,
 ) -> SurfaceJet {
-    let jet = surface.evaluate(positions, patch, u, v);
-    let regular = surface.is_smooth(patch.basis);
-    let inner = |t: f64| t.clamp(CORNER, 1.0 - CORNER);
-    if regular || (inner(u) == u || inner(v) == v) {
-        return jet;
-    }
-    let mut beside = surface.evaluate(positions, patch, inner(u), inner(v));
-    beside.derivatives[0] = jet.position();
-    beside
+    Place::new(surface, patch.basis, u, v).jet(positions, surface, patch)
 }
 
-fn sample_patch(
-    positions: &[DVec3],
-    surface: &SubdivisionSurface,
-    patch: &Patch,
-    side: usize,
-) -> PatchSamples {
-    let at = |i: usize| i as f64 / (side - 1) as f64;
-    let mut points = Vec::with_capacity(side * side);
-    for k in 0..side * side {
-        let jet = jet_at(positions, surface, patch, at(k / side), at(k % side));
+/// The weights of a point of a basis' patches.
+struct Place {
+    weights: JetWeights,
+    /// Those beside an extraordinary corner, for the derivatives.
+    beside: Option<JetWeights>,
+}
+
+impl Place {
+    fn new(surface: &SubdivisionSurface, basis: BasisId, u: f64, v: f64) -> Self {
+        let inner = |t: f64| t.clamp(CORNER, 1.0 - CORNER);
+        let sound = surface.is_smooth(basis) || inner(u) == u || inner(v) == v;
+        let beside = (!sound).then(|| surface.weights(basis, inner(u), inner(v)));
+        Self { weights: surface.weights(basis, u, v), beside }
+    }
+
+    fn jet(&self, positions: &[DVec3], surface: &SubdivisionSurface, patch: &Patch) -> SurfaceJet {
+        let jet = surface.apply(&self.weights, positions, patch);
+        let Some(beside) = &self.beside else { return jet };
+        let mut beside = surface.apply(beside, positions, patch);
+        beside.derivatives[0] = jet.position();
+        beside
+    }
+}
+
+/// Jets of all patches at the same parameters; bases that many patches share have their weights
+/// evaluated once.
+pub(crate) struct JetTable<'s> {
+    surface: &'s SubdivisionSurface,
+    parameters: Vec<[f64; 2]>,
+    by_basis: Vec<Vec<Place>>,
+}
+
+impl<'s> JetTable<'s> {
+    /// From so many patches on a basis is worth its memory.
+    const SHARED: usize = 8;
+
+    pub(crate) fn new(surface: &'s SubdivisionSurface, parameters: Vec<[f64; 2]>) -> Self {
+        let mut uses = vec![0; surface.basis_count()];
+        surface.patches().iter().for_each(|patch| uses[patch.basis.0] += 1);
+        let by_basis = uses
+            .par_iter()
+            .enumerate()
+            .map(|(basis, &count)| match count {
+                Self::SHARED.. => parameters
+                    .par_iter()
+                    .map(|&[u, v]| Place::new(surface, BasisId(basis), u, v))
+                    .collect(),
+                _ => Vec::new(),
+            })
+            .collect();
+        Self { surface, parameters, by_basis }
+    }
+
+    /// The jet of a patch at parameter pair `k`.
+    pub(crate) fn jet(&self, positions: &[DVec3], patch: &Patch, k: usize) -> SurfaceJet {
+        match self.by_basis[patch.basis.0].get(k) {
+            Some(place) => place.jet(positions, self.surface, patch),
+            None => {
+                let [u, v] = self.parameters[k];
+                jet_at(positions, self.surface, patch, u, v)
+            }
+        }
+    }
+}
+
+fn sample_patch(positions: &[DVec3], table: &JetTable<'_>, patch: &Patch) -> PatchSamples {
+    let count = table.parameters.len();
+    let mut points = Vec::with_capacity(count);
+    for k in 0..count {
+        let jet = table.jet(positions, patch, k);
         let shape = ThirdOrder::new(&jet).ok();
         let principal =
             jet.second_form().and_then(|second| principal_curvatures(jet.first_form(), second));

@@ -1,6 +1,6 @@
 //! The control meshes of a run: the input refined as far as needed, then once per level.
 
-use subdiv_catmull_clark::{Creases, refine, refinements_needed};
+use subdiv_catmull_clark::{Creases, check_valences, refine, refinements_needed};
 
 use crate::constraints::refine_fixed;
 use crate::error::Error;
@@ -29,6 +29,7 @@ impl Control {
     pub(crate) fn first(input: &Input, options: &Options) -> Result<Self, Error> {
         let mut fixed = vec![false; input.mesh.vertex_count()];
         input.constraints.vertices.iter().for_each(|&v| fixed[v as usize] = true);
+        check_valences(&input.mesh)?;
         let (mesh, creases) = (input.mesh.clone(), input.creases.clone());
         let mut this = Self { mesh, creases, fixed };
         for _ in 0..refinements_needed(&this.mesh, &this.creases) {

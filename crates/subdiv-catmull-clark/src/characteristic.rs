@@ -1,5 +1,6 @@
 //! Eigenstructure of Catmull-Clark subdivision around an interior vertex.
 
+use crate::stencils::Stencils;
 use numerics::gauss_jordan_rows;
 use std::f64::consts::{PI, TAU};
 
@@ -74,20 +75,20 @@ pub(crate) fn characteristic_ring(n: usize) -> Vec<[f64; 2]> {
 }
 
 /// Characteristic map on the `2n + 8` control points of a patch, from its subdivision matrix.
-pub(crate) fn characteristic_map(n: usize, subdivision: &[f64]) -> Vec<[f64; 2]> {
-    let count = 2 * n + 8;
+pub(crate) fn characteristic_map(n: usize, subdivision: &Stencils) -> Vec<[f64; 2]> {
     let ring = 2 * n + 1;
     let lambda = subdominant_eigenvalue(n);
     let mut map = characteristic_ring(n);
     // The seven outer points follow from (λ I − A₂₂) x = A₂₁ · ring.
     let mut system = [[0.0; 9]; 7];
     for (i, row) in system.iter_mut().enumerate() {
-        let a = &subdivision[(ring + i) * count..(ring + i + 1) * count];
-        for j in 0..7 {
-            row[j] = f64::from(u8::from(i == j)) * lambda - a[ring + j];
-        }
-        for axis in 0..2 {
-            row[7 + axis] = a[..ring].iter().zip(&map).map(|(w, p)| w * p[axis]).sum();
+        row[i] = lambda;
+        let (columns, weights) = subdivision.row(ring + i);
+        for (&c, w) in columns.iter().zip(weights) {
+            match map.get(c as usize) {
+                Some(p) => (0..2).for_each(|axis| row[7 + axis] += w * p[axis]),
+                None => row[c as usize - ring] -= w,
+            }
         }
     }
     gauss_jordan_rows(&mut system);

@@ -1,16 +1,17 @@
 //! Patches that look alike share their evaluation: a class per local connectivity.
 
+use crate::characteristic::limit_masks;
+use crate::crease::MAX_DEPTH;
 use crate::jet::JetWeights;
 use crate::local::{LocalPatch, grid_weights};
+use crate::stencils::Stencils;
 use std::collections::HashMap;
-
-/// How many halvings an evaluation takes at most; a parameter nearer than `2^-48` to an
-/// extraordinary corner is moved off it.
-const MAX_DEPTH: usize = 48;
 
 #[derive(Clone, Debug)]
 struct Class {
     vertex_count: usize,
+    /// Edges at the first corner, if that is the only extraordinary one and no crease is near.
+    interior: Option<usize>,
     kind: Kind,
 }
 
@@ -19,7 +20,7 @@ enum Kind {
     /// A bi-cubic B-spline patch on combinations of local vertices.
     Regular(Box<[Vec<(usize, f64)>; 16]>),
     /// Four sub-patches: class and matrix of the step down to it.
-    Split([(usize, Vec<f64>); 4]),
+    Split([(usize, Stencils); 4]),
     /// Being built.
     Pending,
 }
@@ -43,13 +44,14 @@ impl Classes {
         }
         let id = self.classes.len();
         self.by_key.insert(key, id);
-        self.classes.push(Class { vertex_count: local.mesh.vertex_count(), kind: Kind::Pending });
+        let (vertex_count, interior) = (local.mesh.vertex_count(), local.interior_valence());
+        self.classes.push(Class { vertex_count, interior, kind: Kind::Pending });
         self.classes[id].kind = match local.regular_grid() {
             Some(grid) => Kind::Regular(Box::new(grid)),
             None => {
                 let [a, b, c, d] = local.children()?;
                 let mut below =
-                    |(local, matrix): (LocalPatch, Vec<f64>)| Some((self.insert(&local)?, matrix));
+                    |(local, matrix): (LocalPatch, Stencils)| Some((self.insert(&local)?, matrix));
                 Kind::Split([below(a)?, below(b)?, below(c)?, below(d)?])
             }
         };
@@ -70,17 +72,19 @@ impl Classes {
 
     /// Matrix from a class's control points to those of its first sub-patch, if that is of the
     /// same class: the subdivision matrix of an extraordinary corner.
-    pub(crate) fn subdivision_matrix(&self, class: usize) -> Option<&[f64]> {
+    pub(crate) fn subdivision_matrix(&self, class: usize) -> Option<&Stencils> {
         match &self.classes[class].kind {
             Kind::Split(below) if below[0].0 == class => Some(&below[0].1),
             _ => None,
         }
     }
 
-    /// Jets of the control points' weights at `(u, v)` in the unit square.
+    /// Jets of the control points' weights at `(u, v)` in the unit square; a parameter nearer than
+    /// `2^-48` to an extraordinary corner is moved off it, but has the corner's position.
     pub(crate) fn weights(&self, class: usize, u: f64, v: f64) -> JetWeights {
         let (mut class, mut u, mut v) = (class, u, v);
-        let mut path: Vec<(usize, &[f64])> = Vec::new();
+        let mut path: Vec<(usize, &Stencils)> = Vec::new();
+        let mut corner = None;
         loop {
             match &self.classes[class].kind {
                 Kind::Regular(grid) => {
@@ -90,10 +94,16 @@ impl Classes {
                     for &(columns, matrix) in path.iter().rev() {
                         weights = weights.times(matrix, columns);
                     }
+                    if let Some(valence) = corner {
+                        let position = self.limit_position(valence, &path);
+                        weights.row_mut(0).copy_from_slice(&position);
+                    }
                     return weights;
                 }
                 Kind::Split(below) => {
                     if path.len() == MAX_DEPTH {
+                        // Where many sectors meet a step shrinks the ring by a third only.
+                        corner = self.classes[class].interior.filter(|_| u < 0.5 && v < 0.5);
                         (u, v) = (1.0 - u.round(), 1.0 - v.round());
                     }
                     let child = match (u < 0.5, v < 0.5) {
@@ -110,5 +120,20 @@ impl Classes {
                 Kind::Pending => unreachable!("a class is finished before it can be evaluated"),
             }
         }
+    }
+
+    /// Weights of the limit position of an extraordinary corner that a path leads to.
+    fn limit_position(&self, valence: usize, path: &[(usize, &Stencils)]) -> Vec<f64> {
+        let mut weights = limit_masks(valence).position;
+        // The last matrix leaves the corner's neighbourhood, the others lead to it.
+        for &(columns, matrix) in path[..path.len() - 1].iter().rev() {
+            let mut before = vec![0.0; columns];
+            for (k, w) in weights.iter().enumerate() {
+                let (at, row) = matrix.row(k);
+                at.iter().zip(row).for_each(|(&c, m)| before[c as usize] += w * m);
+            }
+            weights = before;
+        }
+        weights
     }
 }

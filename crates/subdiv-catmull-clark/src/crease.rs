@@ -6,10 +6,17 @@ use std::collections::HashMap;
 /// Sharpness of an edge that stays sharp for ever.
 pub const INFINITE_SHARPNESS: f64 = f64::INFINITY;
 
+/// Above this sharpness an edge counts as infinitely sharp: no evaluation halves a patch oftener,
+/// so that none comes near enough to see the edge turn smooth.
+pub const LARGEST_SHARPNESS: f64 = MAX_DEPTH as f64;
+
+/// How many halvings an evaluation takes at most.
+pub(crate) const MAX_DEPTH: usize = 48;
+
 /// Edge sharpness (DeRose, Kass and Truong 1998) and corners of a control mesh.
 ///
 /// An edge of sharpness `s` uses the crease masks for `s` refinements and turns smooth
-/// afterwards; boundary edges are always infinitely sharp and need no entry. A corner vertex is
+/// afterwards, or never if `s` exceeds [`LARGEST_SHARPNESS`]; boundary edges are always infinitely sharp and need no entry. A corner vertex is
 /// interpolated. A boundary vertex with a single face is a corner by itself, so that the surface
 /// of a regular grid with boundary is the bi-cubic B-spline with natural ends.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -25,10 +32,13 @@ impl Creases {
         Self::default()
     }
 
-    /// Sets the sharpness of the edge between two vertices; zero or less makes it smooth.
+    /// Sets the sharpness of the edge between two vertices; zero or less makes it smooth, more than
+    /// [`LARGEST_SHARPNESS`] infinitely sharp.
     pub fn set(&mut self, a: VertexId, b: VertexId, sharpness: f64) {
         let key = (a.0.min(b.0), a.0.max(b.0));
-        if sharpness > 0.0 {
+        if sharpness > LARGEST_SHARPNESS {
+            self.sharpness.insert(key, INFINITE_SHARPNESS);
+        } else if sharpness > 0.0 {
             self.sharpness.insert(key, sharpness);
         } else {
             self.sharpness.remove(&key);
@@ -82,6 +92,17 @@ pub enum CreaseError {
 }
 
 impl CreaseList {
+    /// What is to be said if a finite sharpness counts as infinite.
+    #[must_use]
+    pub fn note(&self) -> Option<String> {
+        let above = |s: f64| s > LARGEST_SHARPNESS && s != INFINITE_SHARPNESS;
+        let ((a, b), sharpness) = *self.edges.iter().find(|(_, s)| above(*s))?;
+        Some(format!(
+            "edge {a}–{b} has sharpness {sharpness}; above {LARGEST_SHARPNESS} an edge counts as \
+             infinitely sharp"
+        ))
+    }
+
     /// The creases, checked against a mesh.
     ///
     /// # Errors
@@ -144,41 +165,43 @@ impl Tags {
             }
         }
         for v in mesh.vertices() {
-            for h in mesh.outgoing_half_edges(v) {
-                if tags.sharpness[h.index()] == 0.0 {
-                    tags.shift[h.index()] = tags.crease_shift(mesh, h);
-                }
-            }
+            tags.shift_sectors(mesh, v);
         }
         tags
     }
 
-    /// `cos(θ_k)/4`, from γ = 3/8 − cos(θ_k)/4 of Biermann et al. 2000 (sec. 3.2), where the
-    /// origin of `h` has a sector of `k` faces between two infinitely sharp edges.
-    fn crease_shift(&self, mesh: &PolyMesh, h: HalfEdgeId) -> f64 {
-        let infinite = |h: HalfEdgeId| self.sharpness[h.index()] == INFINITE_SHARPNESS;
-        let v = mesh.origin(h);
-        let sharp = mesh.outgoing_half_edges(v).filter(|&h| infinite(h)).count();
-        if sharp < 2 {
-            return 0.0;
+    /// Sets the shifts of the smooth edges at `v`: `cos(θ_k)/4`, from γ = 3/8 − cos(θ_k)/4 of
+    /// Biermann et al. 2000 (sec. 3.2), in a sector of `k` faces between two infinitely sharp edges.
+    fn shift_sectors(&mut self, mesh: &PolyMesh, v: VertexId) {
+        let infinite = |tags: &Self, h: HalfEdgeId| tags.sharpness[h.index()] == INFINITE_SHARPNESS;
+        let sharp: Vec<HalfEdgeId> =
+            mesh.outgoing_half_edges(v).filter(|&h| infinite(self, h)).collect();
+        if sharp.len() < 2 {
+            return;
         }
-        let mut faces = 0;
-        let mut at = h;
-        while !infinite(at) {
-            at = mesh.twin(mesh.prev(at));
-            faces += 1;
-        }
-        at = h;
-        while !infinite(at) {
-            at = mesh.next(mesh.twin(at));
-            faces += 1;
-        }
-        // The regular sectors must come out as exact zeros: they decide what is a B-spline patch.
-        if sharp == 2 && !self.corner[v.index()] {
-            if faces == 2 { 0.0 } else { 0.25 * (std::f64::consts::PI / f64::from(faces)).cos() }
-        } else {
-            // A convex corner, taken as a right angle.
-            0.25 * (std::f64::consts::FRAC_PI_2 / f64::from(faces)).cos()
+        let crease = sharp.len() == 2 && !self.corner[v.index()];
+        let mut inside = Vec::new();
+        for &first in sharp.iter().filter(|&&h| mesh.face(h).is_some()) {
+            inside.clear();
+            let mut at = mesh.twin(mesh.prev(first));
+            while !infinite(self, at) {
+                inside.push(at);
+                at = mesh.twin(mesh.prev(at));
+            }
+            let faces = (inside.len() + 1) as f64;
+            // The regular sectors must come out as exact zeros: they decide what is a B-spline
+            // patch.
+            let shift = match crease {
+                true if inside.len() == 1 => 0.0,
+                true => 0.25 * (std::f64::consts::PI / faces).cos(),
+                // A convex corner, taken as a right angle.
+                false => 0.25 * (std::f64::consts::FRAC_PI_2 / faces).cos(),
+            };
+            for &h in &inside {
+                if self.sharpness[h.index()] == 0.0 {
+                    self.shift[h.index()] = shift;
+                }
+            }
         }
     }
 
@@ -249,5 +272,13 @@ mod tests {
         assert!(matches!(list(0, 1, f64::NAN).for_mesh(&mesh), Err(CreaseError::Sharpness { .. })));
         let creases = list(1, 0, f64::INFINITY).for_mesh(&mesh).unwrap();
         assert_eq!(creases.sharpness(VertexId(0), VertexId(1)), INFINITE_SHARPNESS);
+        let huge = list(0, 1, 1e6);
+        let creases = huge.for_mesh(&mesh).unwrap();
+        assert_eq!(creases.sharpness(VertexId(0), VertexId(1)), INFINITE_SHARPNESS);
+        assert_eq!(
+            huge.note().unwrap(),
+            "edge 0–1 has sharpness 1000000; above 48 an edge counts as infinitely sharp"
+        );
+        assert_eq!(list(0, 1, f64::INFINITY).note(), None);
     }
 }

@@ -1,14 +1,11 @@
 //! The polynomial that stands in for the surface near an extraordinary vertex.
 
 use crate::blend::{septic_step, weight_jet};
-use crate::jet::{JET_LEN, Jet, JetWeights, cubic_basis, jet_index, jet_product, separable_jet};
-use numerics::{gauss_jordan, householder, minimizers};
-use std::f64::consts::TAU;
+use crate::jet::{JET_LEN, Jet, JetWeights, cubic_basis, jet_product, separable_jet};
+use crate::modes::{rotational_minimizers, two_ring_columns};
+use crate::monomials::{MONOMIALS, monomial_jets};
+use numerics::gauss_jordan;
 
-/// Total degree of the guide.
-const DEGREE: usize = 5;
-/// Number of monomials up to that degree.
-pub(crate) const MONOMIALS: usize = (DEGREE + 1) * (DEGREE + 2) / 2;
 /// Cells per side and Gauss points per cell side of the integral the guide minimises.
 pub(crate) const CELLS: usize = 4;
 pub(crate) const GAUSS_6: [(f64, f64); 6] = [
@@ -34,29 +31,6 @@ pub(crate) struct Guide {
     /// `(MONOMIALS + points()) × points()`, row-major: the polynomial's coefficients, then the `d`
     /// in the order of the two-ring.
     coefficients: Vec<f64>,
-}
-
-/// Exponents of monomial `k`: by total degree, falling in the first.
-fn exponents() -> [(usize, usize); MONOMIALS] {
-    let mut out = [(0, 0); MONOMIALS];
-    for total in 0..=DEGREE {
-        for j in 0..=total {
-            out[jet_index(total - j, j)] = (total - j, j);
-        }
-    }
-    out
-}
-
-/// Where the `2n + 8` control points of sector `j` stand in the two-ring's order: the centre, its
-/// ring from sector 0 on, then four outer points per sector.
-pub(crate) fn two_ring_columns(n: usize, j: usize) -> Vec<usize> {
-    let outer = |sector: usize, k: usize| 2 * n + 1 + 4 * (sector % n) + k;
-    let mut columns = vec![0];
-    columns.extend((0..2 * n).map(|i| 1 + (i + 2 * j) % (2 * n)));
-    columns.push(outer(j + n - 1, 3));
-    columns.extend((0..4).map(|k| outer(j, k)));
-    columns.extend((0..2).map(|k| outer(j + 1, k)));
-    columns
 }
 
 /// Position among the `2n + 8` control points around an extraordinary vertex of the one at `(i, j)`
@@ -120,9 +94,6 @@ impl Guide {
         map: &[[f64; 2]],
         weights: impl Fn(f64, f64) -> JetWeights,
     ) -> Self {
-        let count = 2 * n + 8;
-        let local = MONOMIALS + count;
-        let width = local + count;
         let mut rows = Vec::new();
         for cell in 0..CELLS * CELLS {
             let corner = [cell / CELLS, cell % CELLS].map(|c| c as f64 / CELLS as f64);
@@ -137,34 +108,7 @@ impl Guide {
                 }
             }
         }
-        // The other sectors see the same integrals in rotated coordinates: reduce one sector to a
-        // triangle, then stack its rotated copies.
-        householder(&mut rows, width, local);
-        let points = 6 * n + 1;
-        let unknowns = MONOMIALS + points;
-        let wide = unknowns + points;
-        let mut stacked = Vec::with_capacity(n * local * wide);
-        for j in 0..n {
-            let rotation = rotated_monomials(TAU * j as f64 / n as f64);
-            let columns = two_ring_columns(n, j);
-            for i in 0..local {
-                let source = &rows[i * width..(i + 1) * width];
-                let mut row = vec![0.0; wide];
-                for (k, out) in row[..MONOMIALS].iter_mut().enumerate() {
-                    let turned = &rotation[k * MONOMIALS..(k + 1) * MONOMIALS];
-                    *out = (i..MONOMIALS).map(|m| source[m] * turned[m]).sum();
-                }
-                // Below the diagonal the reduced rows hold what is left of the reflections.
-                for (k, &c) in columns.iter().enumerate() {
-                    if MONOMIALS + k >= i {
-                        row[MONOMIALS + c] += source[MONOMIALS + k];
-                    }
-                    row[unknowns + c] += source[local + k];
-                }
-                stacked.extend(row);
-            }
-        }
-        Self { valence: n, coefficients: minimizers(&mut stacked, wide, unknowns) }
+        Self { valence: n, coefficients: rotational_minimizers(n, &rows) }
     }
 
     /// Number of control points: the vertex and its two rings.
@@ -198,7 +142,9 @@ impl Guide {
             columns
                 .iter()
                 .enumerate()
-                .map(|(k, &c)| (MONOMIALS + c, jet_product(&rest, &repair.jet(k)))),
+                .map(|(k, &c)| (MONOMIALS + c, jet_product(&rest, &repair.jet(k))))
+                // All but sixteen, except next to the vertex.
+                .filter(|(_, term)| term.iter().any(|&x| x != 0.0)),
         );
         let mut wide = vec![[0.0; JET_LEN]; points];
         for (k, &c) in columns.iter().enumerate() {
@@ -225,19 +171,6 @@ pub(crate) fn coordinate_jets(plain: &JetWeights, map: &[[f64; 2]]) -> [Jet; 2] 
     [0, 1].map(|axis| {
         std::array::from_fn(|d| plain.row(d).iter().zip(map).map(|(w, p)| w * p[axis]).sum())
     })
-}
-
-pub(crate) fn monomial_jets(coordinates: &[Jet; 2]) -> [Jet; MONOMIALS] {
-    let mut out = [[0.0; JET_LEN]; MONOMIALS];
-    out[0][0] = 1.0;
-    for (k, (i, j)) in exponents().into_iter().enumerate().skip(1) {
-        out[k] = if i > 0 {
-            jet_product(&out[jet_index(i - 1, j)], &coordinates[0])
-        } else {
-            jet_product(&out[jet_index(0, j - 1)], &coordinates[1])
-        };
-    }
-    out
 }
 
 /// The four weighted third derivatives by `(ξ, η)` at one sample: of `w` times each monomial, then
@@ -278,45 +211,5 @@ pub(crate) fn sample_rows(
     for (i, factor) in factors.into_iter().enumerate() {
         let scale = factor * (measure * area).sqrt();
         rows.extend(columns.iter().map(|c| scale * c[6 + i]));
-    }
-}
-
-/// Row `k`: the monomial `k` of the rotated coordinates as a combination of monomials.
-pub(crate) fn rotated_monomials(angle: f64) -> Vec<f64> {
-    let (s, c) = angle.sin_cos();
-    let mut out = vec![0.0; MONOMIALS * MONOMIALS];
-    out[0] = 1.0;
-    for (k, (i, j)) in exponents().into_iter().enumerate().skip(1) {
-        // ξ' = c ξ − s η, η' = s ξ + c η.
-        let (before, factors) =
-            if i > 0 { (jet_index(i - 1, j), [c, -s]) } else { (jet_index(0, j - 1), [s, c]) };
-        for (m, (p, q)) in exponents().into_iter().enumerate() {
-            let value = out[before * MONOMIALS + m];
-            if value != 0.0 {
-                out[k * MONOMIALS + jet_index(p + 1, q)] += factors[0] * value;
-                out[k * MONOMIALS + jet_index(p, q + 1)] += factors[1] * value;
-            }
-        }
-    }
-    out
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn rotated_monomials_agree_with_rotated_points() {
-        let angle = 0.7_f64;
-        let (s, c) = angle.sin_cos();
-        let (x, y) = (0.3, -0.8);
-        let (rx, ry) = (c * x - s * y, s * x + c * y);
-        let value = |x: f64, y: f64| exponents().map(|(i, j)| x.powi(i as i32) * y.powi(j as i32));
-        let matrix = rotated_monomials(angle);
-        let (plain, rotated) = (value(x, y), value(rx, ry));
-        for k in 0..MONOMIALS {
-            let sum: f64 = (0..MONOMIALS).map(|m| matrix[k * MONOMIALS + m] * plain[m]).sum();
-            assert!((sum - rotated[k]).abs() < 1e-14, "monomial {k}");
-        }
     }
 }

@@ -1,5 +1,6 @@
 //! Jets: a value and its parameter derivatives up to order three.
 
+use crate::stencils::Stencils;
 use geom_core::{DVec3, SurfaceJet};
 
 /// Number of derivatives in a jet.
@@ -110,15 +111,16 @@ impl JetWeights {
         }
     }
 
-    /// `self · matrix`, the matrix row-major with one row per control point of `self`.
-    pub(crate) fn times(&self, matrix: &[f64], columns: usize) -> Self {
+    /// `self · matrix`, the matrix with one row per control point of `self`.
+    pub(crate) fn times(&self, matrix: &Stencils, columns: usize) -> Self {
         let mut out = Self::zeros(columns);
         for d in 0..JET_LEN {
             for (k, &w) in self.row(d).iter().enumerate() {
                 if w != 0.0 {
-                    let row = &matrix[k * columns..(k + 1) * columns];
-                    for (o, &m) in out.values[d * columns..(d + 1) * columns].iter_mut().zip(row) {
-                        *o += w * m;
+                    let (at, row) = matrix.row(k);
+                    let out = &mut out.values[d * columns..(d + 1) * columns];
+                    for (&c, m) in at.iter().zip(row) {
+                        out[c as usize] += w * m;
                     }
                 }
             }

@@ -28,21 +28,25 @@ mod blend;
 mod characteristic;
 mod classes;
 mod crease;
+mod error;
 mod guide;
 mod jet;
 mod limit;
 mod local;
+mod modes;
+mod monomials;
 mod refine;
 mod regions;
+mod stencils;
 mod surface;
 mod wide;
 
 pub use blend::{Blend, flat_step, septic_step};
 pub use characteristic::{LimitMasks, limit_masks, subdominant_eigenvalue};
-pub use crease::{CreaseError, CreaseList, Creases, INFINITE_SHARPNESS};
+pub use crease::{CreaseError, CreaseList, Creases, INFINITE_SHARPNESS, LARGEST_SHARPNESS};
+pub use error::{MAX_VALENCE, SubdivisionError, check_valences};
 pub use jet::{JET_LEN, JET_ORDERS, Jet, JetWeights, cubic_basis, jet_product};
 pub use limit::{LimitFrame, limit_frames};
-pub use refine::{Refined, Stencils, refine};
-pub use surface::{
-    BasisId, GuideSector, Patch, SubdivisionError, SubdivisionSurface, refinements_needed,
-};
+pub use refine::{Refined, refine};
+pub use stencils::Stencils;
+pub use surface::{BasisId, GuideSector, Patch, SubdivisionSurface, refinements_needed};

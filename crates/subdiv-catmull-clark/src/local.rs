@@ -2,8 +2,11 @@
 
 use crate::crease::{INFINITE_SHARPNESS, Tags, VertexMask};
 use crate::jet::{JetWeights, cubic_basis, jet_index, separable_jet};
-use crate::refine::{Stencils, edge_numbers, next_sharpness, refine_tagged};
+use crate::refine::{edge_numbers, next_sharpness, refine_tagged};
+use crate::stencils::Stencils;
 use geom_core::{DVec3, FaceId, HalfEdgeId, PolyMesh, VertexId};
+use std::collections::HashMap;
+use std::collections::hash_map::Entry;
 
 /// All faces that share a corner with one quad, with local vertex numbers.
 ///
@@ -27,7 +30,7 @@ impl LocalPatch {
     /// also says where the local vertices come from. `None` if a neighbour is not a quad or the
     /// cut-out is not a manifold.
     pub(crate) fn cut(mesh: &PolyMesh, tags: &Tags, corner: HalfEdgeId) -> Option<(Self, Sources)> {
-        let mut walk = Walk { mesh, faces: Vec::new(), starts: Vec::new() };
+        let mut walk = Walk { mesh, places: HashMap::new(), starts: Vec::new() };
         let mut at = corner;
         for _ in 0..4 {
             walk.fan(at);
@@ -76,6 +79,25 @@ impl LocalPatch {
         key
     }
 
+    /// Edges at the first corner if the other three are regular and no crease is near.
+    pub(crate) fn interior_valence(&self) -> Option<usize> {
+        let mesh = &self.mesh;
+        let corners: [VertexId; 4] = std::array::from_fn(|i| i_corner(mesh, i));
+        let smooth = |h: HalfEdgeId| {
+            let [a, b] = [h, mesh.twin(h)].map(HalfEdgeId::index);
+            self.tags.sharpness[a] == 0.0 && self.tags.shift[a] == 0.0 && self.tags.shift[b] == 0.0
+        };
+        let sound = |&v: &VertexId| {
+            !mesh.is_boundary_vertex(v)
+                && !self.tags.corner[v.index()]
+                && mesh.outgoing_half_edges(v).all(smooth)
+        };
+        let regular = |&v: &VertexId| mesh.valence(v) == 4;
+        (corners.iter().all(sound) && corners[1..].iter().all(regular))
+            .then(|| mesh.valence(corners[0]))
+            .filter(|&n| n >= 3)
+    }
+
     // Tags of edges that do not end at a corner of the patch have no influence on it.
     fn touches_patch(&self, h: HalfEdgeId) -> bool {
         let corner = |v: VertexId| (0..4).any(|i| i_corner(&self.mesh, i) == v);
@@ -83,8 +105,9 @@ impl LocalPatch {
     }
 
     /// The four sub-patches at the corners, each with the rows (new local vertex by old local
-    /// vertex) of the refinement matrix, dense and row-major.
-    pub(crate) fn children(&self) -> Option<[(Self, Vec<f64>); 4]> {
+    /// vertex) of the refinement matrix. They are sparse: a step costs as much as the vertices
+    /// around have edges, also where hundreds meet.
+    pub(crate) fn children(&self) -> Option<[(Self, Stencils); 4]> {
         let (faces, stencils) = refine_tagged(&self.mesh, &self.tags);
         let fine = PolyMesh::new(vec![DVec3::ZERO; stencils.rows()], &faces).ok()?;
         let tags = self.refined_tags(&fine);
@@ -94,8 +117,8 @@ impl LocalPatch {
             let start = (4 - i) % 4;
             let h = fine.face_half_edges(FaceId(i as u32)).nth(start)?;
             let (local, sources) = Self::cut(&fine, &tags, h)?;
-            let matrix = dense_rows(&stencils, &fine, &sources, self.mesh.vertex_count());
-            Some((local, matrix))
+            let rows = sources.iter().map(|&h| fine.origin(h).index());
+            Some((local, stencils.select(rows)))
         };
         Some([child(0)?, child(1)?, child(2)?, child(3)?])
     }
@@ -223,22 +246,6 @@ fn i_corner(mesh: &PolyMesh, i: usize) -> VertexId {
     mesh.origin(HalfEdgeId(first.0 + i as u32))
 }
 
-fn dense_rows(
-    stencils: &Stencils,
-    fine: &PolyMesh,
-    sources: &[HalfEdgeId],
-    columns: usize,
-) -> Vec<f64> {
-    let mut matrix = vec![0.0; sources.len() * columns];
-    for (row, &h) in matrix.chunks_mut(columns).zip(sources) {
-        let (at, weights) = stencils.row(fine.origin(h).index());
-        for (&c, &w) in at.iter().zip(weights) {
-            row[c as usize] = w;
-        }
-    }
-    matrix
-}
-
 /// Weights of a bi-cubic patch at `(u, v)` on the local vertices its grid is made of.
 pub(crate) fn grid_weights(
     grid: &[Vec<(usize, f64)>; 16],
@@ -266,7 +273,8 @@ pub(crate) fn grid_weights(
 
 struct Walk<'a> {
     mesh: &'a PolyMesh,
-    faces: Vec<FaceId>,
+    // Where in the list a face stands.
+    places: HashMap<FaceId, usize>,
     // The half-edge each face's corners are listed from.
     starts: Vec<HalfEdgeId>,
 }
@@ -297,9 +305,9 @@ impl Walk<'_> {
 
     fn visit(&mut self, h: HalfEdgeId) {
         if let Some(f) = self.mesh.face(h)
-            && !self.faces.contains(&f)
+            && let Entry::Vacant(place) = self.places.entry(f)
         {
-            self.faces.push(f);
+            place.insert(self.starts.len());
             self.starts.push(h);
         }
     }
@@ -307,7 +315,7 @@ impl Walk<'_> {
     // Glues the faces along the edges at the quad's corners and numbers what remains.
     fn number_vertices(&self, corner: HalfEdgeId) -> Option<(Vec<[u32; 4]>, Sources)> {
         let mesh = self.mesh;
-        if self.faces.iter().any(|&f| mesh.face_degree(f) != 4) {
+        if self.places.keys().any(|&f| mesh.face_degree(f) != 4) {
             return None;
         }
         let quad: [VertexId; 4] = {
@@ -319,8 +327,7 @@ impl Walk<'_> {
             })
         };
         let slot = |h: HalfEdgeId| -> Option<usize> {
-            let f = mesh.face(h)?;
-            let i = self.faces.iter().position(|&g| g == f)?;
+            let i = *self.places.get(&mesh.face(h)?)?;
             let mut at = self.starts[i];
             for k in 0..4 {
                 if at == h {
@@ -330,7 +337,7 @@ impl Walk<'_> {
             }
             None
         };
-        let mut parent: Vec<usize> = (0..4 * self.faces.len()).collect();
+        let mut parent: Vec<usize> = (0..4 * self.starts.len()).collect();
         for &start in &self.starts {
             let mut h = start;
             for _ in 0..4 {
@@ -348,7 +355,7 @@ impl Walk<'_> {
         }
         let mut number = vec![u32::MAX; parent.len()];
         let mut sources = Vec::new();
-        let mut faces = Vec::with_capacity(self.faces.len());
+        let mut faces = Vec::with_capacity(self.starts.len());
         for (i, &start) in self.starts.iter().enumerate() {
             let mut h = start;
             let mut corners = [0; 4];

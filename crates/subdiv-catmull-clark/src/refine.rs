@@ -1,66 +1,12 @@
 //! One step of Catmull-Clark refinement, as connectivity and as a sparse matrix.
 
 use crate::crease::{Creases, INFINITE_SHARPNESS, Tags, VertexMask};
-use geom_core::{DVec3, HalfEdgeId, MeshError, PolyMesh, VertexId};
+use crate::error::SubdivisionError;
+use crate::stencils::Stencils;
+use geom_core::{HalfEdgeId, PolyMesh, VertexId};
 
-/// A sparse matrix that makes new points from old ones; every row sums to one.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct Stencils {
-    starts: Vec<usize>,
-    columns: Vec<u32>,
-    weights: Vec<f64>,
-}
-
-impl Stencils {
-    fn with_capacity(rows: usize, entries: usize) -> Self {
-        let mut starts = Vec::with_capacity(rows + 1);
-        starts.push(0);
-        Self { starts, columns: Vec::with_capacity(entries), weights: Vec::with_capacity(entries) }
-    }
-
-    fn push(&mut self, row: &mut Vec<(u32, f64)>) {
-        row.sort_by_key(|&(column, _)| column);
-        for &(column, weight) in row.iter() {
-            let fresh = self.columns.len() == self.starts[self.starts.len() - 1]
-                || self.columns[self.columns.len() - 1] != column;
-            if fresh {
-                self.columns.push(column);
-                self.weights.push(weight);
-            } else if let Some(last) = self.weights.last_mut() {
-                *last += weight;
-            }
-        }
-        self.starts.push(self.columns.len());
-        row.clear();
-    }
-
-    /// Number of new points.
-    #[must_use]
-    pub fn rows(&self) -> usize {
-        self.starts.len() - 1
-    }
-
-    /// Old points and weights of new point `i`, sorted by index.
-    #[must_use]
-    pub fn row(&self, i: usize) -> (&[u32], &[f64]) {
-        let range = self.starts[i]..self.starts[i + 1];
-        (&self.columns[range.clone()], &self.weights[range])
-    }
-
-    /// The new points.
-    ///
-    /// # Panics
-    /// If `old` is shorter than the largest index.
-    #[must_use]
-    pub fn apply(&self, old: &[DVec3]) -> Vec<DVec3> {
-        (0..self.rows())
-            .map(|i| {
-                let (columns, weights) = self.row(i);
-                columns.iter().zip(weights).map(|(&c, &w)| w * old[c as usize]).sum()
-            })
-            .collect()
-    }
-}
+/// Weights one refinement may have, 12 bytes each.
+const MAX_WEIGHTS: usize = 1 << 27;
 
 /// A refined control mesh and how its points come from the old ones.
 #[derive(Clone, Debug, PartialEq)]
@@ -81,8 +27,10 @@ pub struct Refined {
 /// corner first.
 ///
 /// # Errors
-/// [`MeshError::TooLarge`] if the result has more half-edges than ids.
-pub fn refine(mesh: &PolyMesh, creases: &Creases) -> Result<Refined, MeshError> {
+/// [`SubdivisionError::TooManyWeights`] if a face has thousands of corners, or
+/// [`SubdivisionError::Mesh`] if the result has more half-edges than ids.
+pub fn refine(mesh: &PolyMesh, creases: &Creases) -> Result<Refined, SubdivisionError> {
+    check_weights(mesh)?;
     let tags = Tags::new(mesh, creases);
     let (faces, stencils) = refine_tagged(mesh, &tags);
     let positions = stencils.apply(mesh.positions());
@@ -102,6 +50,22 @@ pub fn refine(mesh: &PolyMesh, creases: &Creases) -> Result<Refined, MeshError> 
         }
     }
     Ok(Refined { mesh: fine, creases: left, stencils })
+}
+
+/// Refuses what would fill the memory: a face of `m` corners writes `m` weights into each of the
+/// `2 m` rows of its corners and edges.
+fn check_weights(mesh: &PolyMesh) -> Result<(), SubdivisionError> {
+    let square = |f| mesh.face_degree(f).saturating_mul(mesh.face_degree(f));
+    let weights = mesh.faces().fold(0_usize, |sum, f| sum.saturating_add(2 * square(f)));
+    match mesh.faces().max_by_key(|&f| mesh.face_degree(f)) {
+        Some(f) if weights > MAX_WEIGHTS => Err(SubdivisionError::TooManyWeights {
+            face: f.index(),
+            corners: mesh.face_degree(f),
+            weights,
+            most: MAX_WEIGHTS,
+        }),
+        _ => Ok(()),
+    }
 }
 
 /// Number of every edge, by half-edge, in the order of [`PolyMesh::edges`].

@@ -4,36 +4,17 @@ use crate::blend::{Blend, flat_step, weight_jet};
 use crate::characteristic::{characteristic_map, limit_masks};
 use crate::classes::Classes;
 use crate::crease::{Creases, Tags};
-use crate::guide::{Guide, MONOMIALS, coordinate_jets};
+use crate::error::{SubdivisionError, check_valences};
+use crate::guide::{Guide, coordinate_jets};
 use crate::jet::{JET_LEN, Jet, JetWeights, jet_product};
 use crate::local::LocalPatch;
+use crate::monomials::MONOMIALS;
 use crate::regions::{RegionFace, Regions};
 use crate::wide::{Cell, WideGuide};
 use geom_core::{DVec3, FaceId, HalfEdgeId, PolyMesh, SurfaceJet, VertexId};
 use std::collections::HashMap;
 use std::collections::hash_map::Entry;
 use std::sync::Arc;
-
-/// Why a control mesh cannot be evaluated.
-#[derive(Clone, Debug, PartialEq, thiserror::Error)]
-#[non_exhaustive]
-#[expect(missing_docs, reason = "the messages spell out every field")]
-pub enum SubdivisionError {
-    /// A face that is not a quad.
-    #[error("face {face} has {corners} corners; refine the mesh once to turn all faces into quads")]
-    NotQuad { face: usize, corners: usize },
-    /// An extraordinary vertex whose ring is not regular.
-    #[error(
-        "extraordinary vertex {vertex} has vertex {neighbour}, which is not regular, in its ring; refine the mesh once more"
-    )]
-    Crowded { vertex: usize, neighbour: usize },
-    /// A vertex with two edges inside the surface.
-    #[error("interior vertex {vertex} has only 2 edges; merge its two faces")]
-    ValenceTwo { vertex: usize },
-    /// The mesh around a face overlaps itself.
-    #[error("the faces around face {face} overlap one another; refine the mesh once more")]
-    Overlapping { face: usize },
-}
 
 /// Patches with the same [`BasisId`] have the same weights on their control points.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
@@ -119,7 +100,8 @@ impl SubdivisionSurface {
     /// Finds the patches of a quad mesh.
     ///
     /// Interior extraordinary vertices that no crease touches are blended and need a regular ring,
-    /// which one refinement of any quad mesh gives (see [`crate::refine`]).
+    /// which one refinement of any quad mesh gives (see [`crate::refine`]). Time and memory grow
+    /// with the valence of a vertex up to [`crate::MAX_VALENCE`], beyond which it is refused.
     ///
     /// # Errors
     /// [`SubdivisionError`] names the first face or vertex at fault.
@@ -142,6 +124,7 @@ impl SubdivisionSurface {
         blend: Blend,
         rings: Option<usize>,
     ) -> Result<Self, SubdivisionError> {
+        check_valences(mesh)?;
         for f in mesh.faces() {
             if mesh.face_degree(f) != 4 {
                 let corners = mesh.face_degree(f);
@@ -310,7 +293,17 @@ impl SubdivisionSurface {
     /// If `positions` is shorter than the mesh's vertices.
     #[must_use]
     pub fn evaluate(&self, positions: &[DVec3], patch: &Patch, u: f64, v: f64) -> SurfaceJet {
-        self.weights(patch.basis, u, v).apply(|k| {
+        self.apply(&self.weights(patch.basis, u, v), positions, patch)
+    }
+
+    /// As [`Self::evaluate`], from [`Self::weights`] that several patches of one basis share.
+    ///
+    /// # Panics
+    /// If `positions` is shorter than the mesh's vertices, or the weights are of another basis with
+    /// more control points.
+    #[must_use]
+    pub fn apply(&self, weights: &JetWeights, positions: &[DVec3], patch: &Patch) -> SurfaceJet {
+        weights.apply(|k| {
             let control = patch.controls[k];
             match self.coefficient(control) {
                 Some((sector, k)) if control as usize >= positions.len() => {

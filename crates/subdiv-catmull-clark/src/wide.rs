@@ -2,10 +2,9 @@
 
 use crate::blend::septic_step;
 use crate::characteristic::{characteristic_ring, subdominant_eigenvalue};
-use crate::guide::{
-    CELLS, GAUSS_6, MONOMIALS, coordinate_jets, monomial_jets, rotated_monomials, sample_rows,
-};
+use crate::guide::{CELLS, GAUSS_6, coordinate_jets, sample_rows};
 use crate::jet::{Jet, JetWeights, cubic_basis, jet_product, separable_jet};
+use crate::monomials::{MONOMIALS, monomial_jets, rotated_monomials};
 use numerics::{householder, minimizers};
 use std::f64::consts::TAU;
 

@@ -2,8 +2,8 @@
 
 use geom_core::{DVec3, PolyMesh, VertexId};
 use subdiv_catmull_clark::{
-    Blend, Creases, INFINITE_SHARPNESS, JET_ORDERS, Patch, SubdivisionSurface, limit_frames,
-    refine, refinements_needed,
+    Blend, Creases, INFINITE_SHARPNESS, JET_ORDERS, MAX_VALENCE, Patch, SubdivisionError,
+    SubdivisionSurface, check_valences, limit_frames, refine, refinements_needed,
 };
 
 fn grid(n: u32, lift: impl Fn(f64, f64) -> f64) -> PolyMesh {
@@ -132,6 +132,89 @@ fn every_valence_matches_differences_and_refinement() {
             assert!(coarse.distance(limit).is_finite() && fine.is_finite());
             assert!(coarse.distance(fine) < 1e-12, "valence {n}: {coarse} against {fine}");
         }
+    }
+}
+
+#[test]
+fn high_valences_are_exact() {
+    for n in [40, 64, MAX_VALENCE as u32] {
+        let mesh = star(n, 2);
+        let surface = SubdivisionSurface::new(&mesh, &Creases::none(), Blend::None).unwrap();
+        let patch = patch_at(&mesh, &surface, 0);
+        // Two explicit refinements, by other code.
+        let fine = refine(&mesh, &Creases::none()).unwrap().mesh;
+        let fine = refine(&fine, &Creases::none()).unwrap().mesh;
+        let finer = SubdivisionSurface::new(&fine, &Creases::none(), Blend::None).unwrap();
+        let near = patch_at(&fine, &finer, 0);
+        for (u, v) in [(0.3, 0.9), (1e-6, 2e-6), (1.0, 1.0), (0.0, 0.0)] {
+            let coarse = surface.evaluate(mesh.positions(), &patch, u / 4.0, v / 4.0).position();
+            let want = finer.evaluate(fine.positions(), &near, u, v).position();
+            assert!(coarse.distance(want) < 1e-13 * 4.0, "valence {n}: {coarse} against {want}");
+        }
+        let smooth = SubdivisionSurface::new(&mesh, &Creases::none(), Blend::Smooth).unwrap();
+        check_by_differences(&mesh, &smooth, &patch_at(&mesh, &smooth, 0), 1e-4);
+        let ones = vec![DVec3::ONE; mesh.vertex_count()];
+        for (u, v) in [(0.3, 0.2), (0.01, 0.02), (0.9, 0.8)] {
+            let jet = smooth.evaluate(&ones, &patch_at(&mesh, &smooth, 0), u, v).derivatives;
+            assert!(jet[0].distance(DVec3::ONE) < 1e-11, "valence {n}");
+            assert!(jet[1..10].iter().all(|d| d.length() < 1e-8), "valence {n}: {jet:?}");
+        }
+    }
+}
+
+#[test]
+fn what_is_beyond_the_largest_valence_is_refused_with_the_reason() {
+    let n = MAX_VALENCE as u32 + 1;
+    let error = SubdivisionSurface::new(&star(n, 1), &Creases::none(), Blend::None).unwrap_err();
+    assert_eq!(
+        error.to_string(),
+        "vertex 0 has 201 edges and the surface is evaluated to 200: nearer to such a vertex than \
+         the width of a sector nothing is resolved; remesh around it"
+    );
+    let ring = |n: u32| {
+        let angle = |k: u32| std::f64::consts::TAU * f64::from(k) / f64::from(n);
+        let points = (0..n).map(|k| DVec3::new(angle(k).cos(), angle(k).sin(), 0.0));
+        PolyMesh::new(points.collect(), &[(0..n).collect::<Vec<u32>>()]).unwrap()
+    };
+    assert!(check_valences(&ring(200)).is_ok());
+    assert!(matches!(
+        check_valences(&ring(n)),
+        Err(SubdivisionError::Corners { face: 0, corners: 201 })
+    ));
+    assert!(refine(&ring(n), &Creases::none()).is_ok());
+    assert!(matches!(
+        refine(&ring(20_000), &Creases::none()),
+        Err(SubdivisionError::TooManyWeights { face: 0, corners: 20_000, .. })
+    ));
+}
+
+#[test]
+fn a_huge_sharpness_is_an_infinite_one() {
+    let mesh = grid(4, |x, y| 0.2 * x * y);
+    let jets = |sharpness: f64| {
+        let mut creases = Creases::none();
+        creases.set(VertexId(6), VertexId(7), sharpness);
+        let surface = SubdivisionSurface::new(&mesh, &creases, Blend::Smooth).unwrap();
+        let at = |k: usize| {
+            let patch = &surface.patches()[k / 25];
+            let (mut u, mut v) = ((k % 5) as f64 / 4.0, (k / 5 % 5) as f64 / 4.0);
+            // Patches may begin at another corner of their face.
+            let mut side = mesh.face_half_edge(patch.face);
+            while side != patch.corner {
+                side = mesh.next(side);
+                (u, v) = (v, 1.0 - u);
+            }
+            surface.evaluate(mesh.positions(), patch, u, v)
+        };
+        (0..16 * 25).map(at).collect::<Vec<_>>()
+    };
+    let sharp = jets(INFINITE_SHARPNESS);
+    assert_eq!(jets(1e6), sharp);
+    assert_eq!(jets(4_294_967_296.0), sharp);
+    // The largest that is followed step by step: the same points, to rounding.
+    for (k, (a, b)) in jets(48.0).iter().zip(&sharp).enumerate() {
+        let off = a.position().distance(b.position());
+        assert!(off < 1e-13, "sample {k}: off by {off:e}");
     }
 }
 

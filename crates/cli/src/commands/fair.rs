@@ -72,9 +72,9 @@ impl Fair {
                 "--family leaves no vertex to fix; drop --fix, --creases and --clamp-boundary",
             ));
         }
-        let model =
+        let mut model =
             exchange::read_model(&self.input).map_err(|e| Failure::input(&self.input, e))?;
-        let input = self.read(&model)?;
+        let input = self.read(&mut model)?;
         let mut watch = Watch::new(context, "fairing").with_checkpoints(&self.checkpoint)?;
         let mut result =
             solve(&input, &options, &mut watch).map_err(|e| refused::<Options>(&self.input, e))?;
@@ -117,14 +117,15 @@ impl Fair {
 }
 
 impl Fair {
-    /// The mesh and what the files say of it.
-    fn read(&self, model: &Model) -> Result<Input, Failure> {
+    /// The mesh and what the files say of it; a note on them joins the model's warnings.
+    fn read(&self, model: &mut Model) -> Result<Input, Failure> {
         let mesh = read_control_mesh(&self.input, model)?;
         let creases = match &self.files.creases {
             None => Creases::none(),
             Some(path) => {
                 let list: CreaseList =
                     exchange::read_ron(path).map_err(|e| Failure::input(path, e))?;
+                model.warnings.extend(list.note().map(|n| format!("{}: {n}", path.display())));
                 list.for_mesh(&mesh).map_err(|e| Failure::input(path, e))?
             }
         };
