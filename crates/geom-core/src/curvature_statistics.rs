@@ -1,7 +1,11 @@
 //! Curvatures of a whole surface in a few numbers.
 
 use crate::bounding_box::BoundingBox;
+use crate::spread::Spread;
 use glam::DVec3;
+
+/// Shares of the area below [`ValueRange::low`] and [`ValueRange::high`].
+const SHARES: [f64; 2] = [0.01, 0.99];
 
 /// Extremes and mean size of a quantity over a surface.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -10,6 +14,14 @@ pub struct ValueRange {
     pub min: f64,
     /// Largest value.
     pub max: f64,
+    /// Where the smallest value was met first.
+    pub min_at: DVec3,
+    /// Where the largest value was met first.
+    pub max_at: DVec3,
+    /// On 1 % of the area the value is lower than this, to 1/256 of its size.
+    pub low: f64,
+    /// On 1 % of the area the value is higher than this, to 1/256 of its size.
+    pub high: f64,
     /// Area-weighted mean of the absolute value.
     pub mean_abs: f64,
 }
@@ -34,12 +46,14 @@ pub struct CurvatureStatistics {
     pub samples: usize,
     /// Points where the surface is singular and has no curvature.
     pub singular: usize,
+    /// Area those points stand for.
+    pub singular_area: f64,
     /// Box around all points.
     pub bounding_box: Option<BoundingBox>,
     weight: f64,
-    mean: Option<ValueRange>,
-    gaussian: Option<ValueRange>,
-    principal: Option<ValueRange>,
+    mean: Option<Gathered>,
+    gaussian: Option<Gathered>,
+    principal: Option<Gathered>,
 }
 
 impl CurvatureStatistics {
@@ -58,22 +72,28 @@ impl CurvatureStatistics {
 
     /// Adds mean curvature `h` and Gaussian curvature `k` at a point that stands for `weight` of
     /// area; a weight of 0 only extends the ranges. The principal curvatures are
-    /// `h ± sqrt(h² − k)`.
+    /// `h ± sqrt(h² − k)`. Values that are not finite make the point singular.
     pub fn add(&mut self, point: DVec3, weight: f64, h: f64, k: f64) {
+        let half = (h * h - k).max(0.0).sqrt();
+        if !(h.is_finite() && k.is_finite() && half.is_finite()) {
+            self.add_singular(point, weight);
+            return;
+        }
         self.add_point(point);
         self.samples += 1;
         self.weight += weight;
-        let half = (h * h - k).max(0.0).sqrt();
-        widen(&mut self.mean, h, h, weight * h.abs());
-        widen(&mut self.gaussian, k, k, weight * k.abs());
-        let sizes = 0.5 * ((h + half).abs() + (h - half).abs());
-        widen(&mut self.principal, h - half, h + half, weight * sizes);
+        gather(&mut self.mean, point, weight, &[h], h.abs());
+        gather(&mut self.gaussian, point, weight, &[k], k.abs());
+        let (low, high) = (h - half, h + half);
+        let size = 0.5 * (low.abs() + high.abs());
+        gather(&mut self.principal, point, weight, &[low, high], size);
     }
 
-    /// A point without curvature.
-    pub fn add_singular(&mut self, point: DVec3) {
+    /// A point without curvature that stands for `weight` of area.
+    pub fn add_singular(&mut self, point: DVec3, weight: f64) {
         self.add_point(point);
         self.singular += 1;
+        self.singular_area += weight;
     }
 
     /// Adds the samples of another surface.
@@ -81,18 +101,21 @@ impl CurvatureStatistics {
         self.area += other.area;
         self.samples += other.samples;
         self.singular += other.singular;
+        self.singular_area += other.singular_area;
         self.weight += other.weight;
         if let Some(bounds) = other.bounding_box {
             self.add_point(bounds.min);
             self.add_point(bounds.max);
         }
         for (own, other) in [
-            (&mut self.mean, other.mean),
-            (&mut self.gaussian, other.gaussian),
-            (&mut self.principal, other.principal),
+            (&mut self.mean, &other.mean),
+            (&mut self.gaussian, &other.gaussian),
+            (&mut self.principal, &other.principal),
         ] {
-            if let Some(range) = other {
-                widen(own, range.min, range.max, range.mean_abs);
+            match (own.as_mut(), other) {
+                (Some(own), Some(other)) => own.merge(other),
+                (None, Some(_)) => own.clone_from(other),
+                (_, None) => {}
             }
         }
     }
@@ -100,35 +123,69 @@ impl CurvatureStatistics {
     /// Mean curvature in 1/length, `None` without samples.
     #[must_use]
     pub fn mean_curvature(&self) -> Option<ValueRange> {
-        self.finished(self.mean)
+        self.mean.as_ref().map(|g| g.finished(self.weight))
     }
 
     /// Gaussian curvature in 1/length², `None` without samples.
     #[must_use]
     pub fn gaussian_curvature(&self) -> Option<ValueRange> {
-        self.finished(self.gaussian)
+        self.gaussian.as_ref().map(|g| g.finished(self.weight))
     }
 
     /// Both principal curvatures together in 1/length, `None` without samples.
     #[must_use]
     pub fn principal_curvature(&self) -> Option<ValueRange> {
-        self.finished(self.principal)
-    }
-
-    /// While gathering, `mean_abs` holds the weighted sum.
-    fn finished(&self, range: Option<ValueRange>) -> Option<ValueRange> {
-        let mean = |sum: f64| if self.weight > 0.0 { sum / self.weight } else { f64::NAN };
-        range.map(|r| ValueRange { mean_abs: mean(r.mean_abs), ..r })
+        self.principal.as_ref().map(|g| g.finished(self.weight))
     }
 }
 
-fn widen(range: &mut Option<ValueRange>, low: f64, high: f64, sum: f64) {
-    *range = Some(match *range {
-        None => ValueRange { min: low, max: high, mean_abs: sum },
-        Some(r) => {
-            ValueRange { min: r.min.min(low), max: r.max.max(high), mean_abs: r.mean_abs + sum }
+/// A quantity while it is gathered.
+#[derive(Clone, Debug, PartialEq)]
+struct Gathered {
+    min: (f64, DVec3),
+    max: (f64, DVec3),
+    /// Of the sizes times their areas.
+    sum: f64,
+    spread: Spread,
+}
+
+/// Adds values at one point, in rising order, with their mean size.
+fn gather(to: &mut Option<Gathered>, point: DVec3, weight: f64, values: &[f64], size: f64) {
+    let (Some(&low), Some(&high)) = (values.first(), values.last()) else { return };
+    let here = Gathered {
+        min: (low, point),
+        max: (high, point),
+        sum: weight * size,
+        spread: Spread::default(),
+    };
+    match to {
+        Some(gathered) => gathered.merge(&here),
+        None => *to = Some(here),
+    }
+    if let Some(gathered) = to {
+        values.iter().for_each(|x| gathered.spread.add(*x, weight));
+    }
+}
+
+impl Gathered {
+    fn merge(&mut self, other: &Self) {
+        if other.min.0 < self.min.0 {
+            self.min = other.min;
         }
-    });
+        if other.max.0 > self.max.0 {
+            self.max = other.max;
+        }
+        self.sum += other.sum;
+        self.spread.merge(&other.spread);
+    }
+
+    fn finished(&self, weight: f64) -> ValueRange {
+        let ((min, min_at), (max, max_at)) = (self.min, self.max);
+        let [low, high] = self.spread.quantiles(SHARES).unwrap_or([min, max]);
+        let mean_abs = if weight > 0.0 { self.sum / weight } else { 0.5 * (min.abs() + max.abs()) };
+        let (low, high) = (low.clamp(min, max), high.clamp(min, max));
+        ValueRange { min, max, min_at, max_at, low, high, mean_abs }
+    }
 }
 
 #[cfg(test)]
@@ -151,10 +208,22 @@ mod tests {
         let [mut merged, second] = parts;
         merged.merge(&second);
         assert_eq!(merged.gaussian_curvature(), all.gaussian_curvature());
+        let range = all.gaussian_curvature().unwrap();
+        assert_eq!((range.min_at, range.max_at), (DVec3::splat(0.0), DVec3::splat(2.0)));
+        assert!(range.low == -2.0 && (range.high / 0.0625 - 1.0).abs() < 1.0 / 256.0, "{range:?}");
         assert_eq!((merged.area, merged.samples), (all.area, all.samples));
         assert_eq!(merged.bounding_box, all.bounding_box);
         let want = (1.0 * 0.5 + 3.0 * 0.25) / 6.0;
         assert_close(all.mean_curvature().unwrap().mean_abs, want, 1e-15);
         assert_eq!(CurvatureStatistics::default().mean_curvature(), None);
+    }
+
+    #[test]
+    fn values_without_meaning_are_no_samples() {
+        let mut all = CurvatureStatistics::default();
+        all.add(DVec3::X, 1.0, f64::NAN, 1.0);
+        all.add(DVec3::X, 1.0, 1e200, -1.0);
+        all.add(DVec3::X, 2.0, 0.0, f64::INFINITY);
+        assert_eq!((all.samples, all.singular, all.singular_area), (0, 3, 4.0));
     }
 }

@@ -4,19 +4,25 @@
 //! its outward normal has negative mean curvature.
 
 mod bounding_box;
+mod budget;
 mod curvature_derivatives;
 mod curvature_statistics;
 mod forms;
 mod isolines;
 mod jet;
+mod jet_fit;
 mod mesh_curvature;
+mod mesh_repair;
+mod neighbours;
 mod poly_mesh;
 mod quad_grid;
+mod spread;
 mod third_order;
 mod torus_fit;
 mod tri_mesh;
 
 pub use bounding_box::BoundingBox;
+pub use budget::{Amount, Budget, BudgetError, Cost};
 pub use curvature_derivatives::CurvatureDerivatives;
 pub use curvature_statistics::{CurvatureStatistics, ValueRange};
 pub use forms::{
@@ -28,6 +34,7 @@ pub use glam::{DMat3, DVec2, DVec3};
 pub use isolines::{Isoline, isolines};
 pub use jet::SurfaceJet;
 pub use mesh_curvature::{VertexCurvature, mesh_curvature_statistics, vertex_curvatures};
+pub use mesh_repair::{coinciding_points, faces_to_turn};
 pub use numerics::assert_close;
 pub use poly_mesh::{FaceId, HalfEdgeId, MeshError, PolyMesh, VertexId};
 pub use quad_grid::{GridError, QuadGrid};
