@@ -2,7 +2,7 @@
 
 use crate::curve::BsplineCurve;
 use crate::knots::KnotVector;
-use crate::statistics::{CELLS, GAUSS, add};
+use crate::statistics::{CELLS, CurvatureSamples, GAUSS};
 use crate::surface::BsplineSurface;
 use crate::trim::Trim;
 use geom_core::CurvatureStatistics;
@@ -277,16 +277,18 @@ impl BsplineSurface {
         let region = Region::new(trim, self);
         let nodes = region.nodes();
         let places: Vec<[f64; 2]> = nodes.iter().map(|n| n.at).collect();
-        let mut statistics = CurvatureStatistics::default();
+        let mut samples = CurvatureSamples::new(self);
         for (jet, node) in self.jets(&places, 2).iter().zip(&nodes) {
             let area = node.weight * jet.first_form().determinant().max(0.0).sqrt();
-            statistics.add_area(area);
-            add(&mut statistics, jet, area);
+            samples.statistics.add_area(area);
+            samples.add(node.at, jet, area);
         }
         let border = trim.loops().iter().flat_map(crate::trim::TrimLoop::polygon);
         let border: Vec<[f64; 2]> = border.map(|p| [p.x, p.y]).collect();
-        self.jets(&border, 2).iter().for_each(|jet| add(&mut statistics, jet, 0.0));
-        statistics
+        for (jet, at) in self.jets(&border, 2).iter().zip(&border) {
+            samples.add(*at, jet, 0.0);
+        }
+        samples.statistics
     }
 }
 

@@ -1,6 +1,7 @@
 //! Area and curvatures of a whole surface.
 
 use crate::knots::KnotVector;
+use crate::pole::SurfaceCurvature;
 use crate::surface::BsplineSurface;
 use geom_core::{CurvatureStatistics, SurfaceJet};
 use std::ops::Range;
@@ -19,7 +20,8 @@ pub(crate) const CELLS: usize = 16;
 impl BsplineSurface {
     /// Area and curvatures of the surface: area and means by Gauss quadrature with 5 x 5 nodes in
     /// every cell of the knot spans, the extremes over the nodes and over the corners of the cells.
-    /// Singular points (poles) are counted and left out.
+    /// Poles have the curvature of their surroundings, see [`SurfaceCurvature`]; points without
+    /// curvature are counted and left out, with the area they stand for.
     ///
     /// # Example
     /// ```
@@ -36,26 +38,44 @@ impl BsplineSurface {
     pub fn curvature_statistics(&self) -> CurvatureStatistics {
         let (cells_u, cells_v) = (cells(self.knots_u()), cells(self.knots_v()));
         let (nodes_u, nodes_v) = (nodes(&cells_u), nodes(&cells_v));
-        let mut statistics = CurvatureStatistics::default();
+        let mut samples = CurvatureSamples::new(self);
         let jets = self.jet_grid(&parameters(&nodes_u), &parameters(&nodes_v), 2);
         for (k, jet) in jets.iter().enumerate() {
-            let weight = nodes_u[k / nodes_v.len()].1 * nodes_v[k % nodes_v.len()].1;
-            let area = weight * jet.first_form().determinant().max(0.0).sqrt();
-            statistics.add_area(area);
-            add(&mut statistics, jet, area);
+            let ((u, a), (v, b)) = (nodes_u[k / nodes_v.len()], nodes_v[k % nodes_v.len()]);
+            let area = a * b * jet.first_form().determinant().max(0.0).sqrt();
+            samples.statistics.add_area(area);
+            samples.add([u, v], jet, area);
         }
-        let corners = self.jet_grid(&ends(&cells_u), &ends(&cells_v), 2);
-        for jet in &corners {
-            add(&mut statistics, jet, 0.0);
+        let (ends_u, ends_v) = (ends(&cells_u), ends(&cells_v));
+        let corners = self.jet_grid(&ends_u, &ends_v, 2);
+        for (k, jet) in corners.iter().enumerate() {
+            let at = [ends_u[k / ends_v.len()], ends_v[k % ends_v.len()]];
+            samples.add(at, jet, 0.0);
         }
-        statistics
+        samples.statistics
     }
 }
 
-pub(crate) fn add(statistics: &mut CurvatureStatistics, jet: &SurfaceJet, weight: f64) {
-    match (jet.mean_curvature(), jet.gaussian_curvature()) {
-        (Ok(h), Ok(k)) => statistics.add(jet.position(), weight, h, k),
-        _ => statistics.add_singular(jet.position()),
+/// Statistics of one surface while they are gathered.
+pub(crate) struct CurvatureSamples<'s> {
+    pub(crate) statistics: CurvatureStatistics,
+    // None if the surface leaves the range of `f64` next to a pole.
+    curvature: Option<SurfaceCurvature<'s>>,
+}
+
+impl<'s> CurvatureSamples<'s> {
+    pub(crate) fn new(surface: &'s BsplineSurface) -> Self {
+        let curvature = SurfaceCurvature::new(surface).ok();
+        Self { statistics: CurvatureStatistics::default(), curvature }
+    }
+
+    /// Adds the jet at a parameter pair, which stands for `weight` of area.
+    pub(crate) fn add(&mut self, [u, v]: [f64; 2], jet: &SurfaceJet, weight: f64) {
+        let found = self.curvature.as_ref().and_then(|c| c.of_jet(u, v, jet).ok());
+        match found {
+            Some((h, k)) => self.statistics.add(jet.position(), weight, h, k),
+            None => self.statistics.add_singular(jet.position(), weight),
+        }
     }
 }
 
@@ -120,12 +140,23 @@ mod tests {
     }
 
     #[test]
-    fn a_pole_is_counted_and_left_out() {
+    fn a_pole_is_as_flat_as_its_surroundings() {
         let line = || KnotVector::clamped_uniform(Degree::new(1).unwrap(), 2).unwrap();
         let corners = vec![DVec3::ZERO, DVec3::Y, DVec3::ZERO, DVec3::X];
         let triangle = BsplineSurface::new(line(), line(), corners, None).unwrap();
         let statistics = triangle.curvature_statistics();
         assert_close(statistics.area, 0.5, 1e-12);
-        assert_eq!(statistics.singular, 17);
+        // The triangle is plane at its pole too.
+        assert_eq!(statistics.singular, 0);
+        assert!(statistics.principal_curvature().unwrap().max.abs() < 1e-12);
+    }
+
+    #[test]
+    fn a_cusp_is_counted_and_left_out() {
+        // Both tangents point the same way at the corner where three points lie on a line.
+        let line = || KnotVector::clamped_uniform(Degree::new(1).unwrap(), 2).unwrap();
+        let corners = vec![DVec3::ZERO, DVec3::X, 2.0 * DVec3::X, DVec3::Y];
+        let patch = BsplineSurface::new(line(), line(), corners, None).unwrap();
+        assert!(patch.curvature_statistics().singular > 0);
     }
 }
