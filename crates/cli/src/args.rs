@@ -2,6 +2,7 @@
 //! whose feature is not there is an unknown flag.
 
 use crate::failure::Failure;
+use geom_core::Budget;
 use std::num::NonZeroUsize;
 use std::path::{Path, PathBuf};
 
@@ -12,14 +13,27 @@ pub(crate) struct GlobalArgs {
     #[arg(long, value_name = "FILE.json", global = true)]
     pub(crate) metrics: Option<PathBuf>,
     /// Number of threads (default: one per core); results do not depend on it
-    #[arg(long, value_name = "N", global = true)]
+    #[arg(long, value_name = "N", global = true, value_parser = threads)]
     pub(crate) threads: Option<NonZeroUsize>,
+    /// Run even if the estimate exceeds the memory of the machine or an hour
+    #[arg(long, global = true)]
+    pub(crate) force: bool,
+    /// Keep corners of meshes apart that coincide to 1e-9 of the size
+    #[arg(long, global = true)]
+    pub(crate) no_weld: bool,
     /// Print no summary and no progress
     #[arg(short, long, global = true)]
     pub(crate) quiet: bool,
     /// Log to stderr; twice for more
     #[arg(short, long, action = clap::ArgAction::Count, global = true)]
     pub(crate) verbose: u8,
+}
+
+fn threads(text: &str) -> Result<NonZeroUsize, String> {
+    match text.parse() {
+        Ok(n @ 1..=Budget::MOST_THREADS) => Ok(NonZeroUsize::new(n).unwrap_or(NonZeroUsize::MIN)),
+        _ => Err(format!("give a number from 1 to {}", Budget::MOST_THREADS)),
+    }
 }
 
 /// `-o`, for commands that write geometry.

@@ -2,8 +2,11 @@
 
 use crate::args::GlobalArgs;
 use crate::failure::{Failure, INTERRUPTED};
+use exchange::Model;
+use geom_core::{Budget, Cost};
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use std::io::IsTerminal;
+use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
@@ -13,6 +16,10 @@ pub(crate) struct Context {
     /// Threads of the global rayon pool.
     pub(crate) threads: usize,
     quiet: bool,
+    /// Whether corners of meshes that coincide are welded.
+    weld: bool,
+    /// What a run may take; nothing is checked with `--force`.
+    budget: Option<Budget>,
     interrupt: Arc<AtomicBool>,
     /// Whether somebody will act on the interrupt flag: a solver that asks for it between steps,
     /// or `main` while it writes.
@@ -40,7 +47,30 @@ impl Context {
         };
         ctrlc::set_handler(handler)
             .map_err(|e| Failure::other(format!("cannot listen for Ctrl-C: {e}")))?;
-        Ok(Self { threads: rayon::current_num_threads(), quiet: global.quiet, interrupt, heeded })
+        let threads = rayon::current_num_threads();
+        let budget = match total_memory() {
+            Some(memory) if !global.force => Some(Budget::of_machine(memory, threads)),
+            _ => None,
+        };
+        let (quiet, weld) = (global.quiet, !global.no_weld);
+        Ok(Self { threads, quiet, weld, budget, interrupt, heeded })
+    }
+
+    /// The content of a file, with its meshes welded and oriented; what was done is among the
+    /// warnings.
+    pub(crate) fn read_model(&self, path: &Path) -> Result<Model, Failure> {
+        let mut model = exchange::read_model(path).map_err(|e| Failure::input(path, e))?;
+        model.mend(self.weld);
+        Ok(model)
+    }
+
+    /// Refuses a run that would exceed the machine, in the name of the option that asks for it.
+    pub(crate) fn afford(&self, cost: Cost, option: &'static str) -> Result<(), Failure> {
+        let checked = self.budget.map_or(Ok(()), |budget| budget.check(cost, option));
+        checked.map_err(|e| {
+            let message = e.to_string().replace(&format!("`{option}`"), &flag_name(option));
+            Failure::usage(format!("{message}, or go on with --force"))
+        })
     }
 
     /// Whether the user pressed Ctrl-C: the callback of every solver asks.
@@ -66,6 +96,18 @@ impl Context {
         bar.set_prefix(label);
         Progress(bar)
     }
+}
+
+fn flag_name(option: &str) -> String {
+    format!("--{}", option.replace('_', "-"))
+}
+
+/// Memory of the machine in bytes, where the system tells.
+fn total_memory() -> Option<u64> {
+    let text = std::fs::read_to_string("/proc/meminfo").ok()?;
+    let line = text.lines().find(|line| line.starts_with("MemTotal:"))?;
+    let kilobytes: u64 = line.split_whitespace().nth(1)?.parse().ok()?;
+    Some(kilobytes * 1024)
 }
 
 /// A progress bar that vanishes when dropped.

@@ -1,5 +1,6 @@
 //! Quad nets in and hyperbolic nets out, for the commands that work on them.
 
+use crate::context::Context;
 use crate::failure::Failure;
 use exchange::{Field, LengthUnit, Mesh, Model, NamedSurface, Net, Segment};
 use geom_core::{DVec3, PolyMesh};
@@ -19,7 +20,10 @@ pub(crate) enum NetInput {
 }
 
 /// Reads a net file (`.ron`) or the one mesh of a file.
-pub(crate) fn read(path: &Path) -> Result<(NetInput, LengthUnit, Vec<String>), Failure> {
+pub(crate) fn read(
+    context: &Context,
+    path: &Path,
+) -> Result<(NetInput, LengthUnit, Vec<String>), Failure> {
     let refused = |e: &dyn std::fmt::Display| Failure::input(path, e);
     if exchange::extension_of(path) == "ron" {
         let text = exchange::read_text(path).map_err(|e| refused(&e))?;
@@ -37,13 +41,16 @@ pub(crate) fn read(path: &Path) -> Result<(NetInput, LengthUnit, Vec<String>), F
             HyperbolicNet::new(quads, normals, net.shape_parameters).map_err(|e| refused(&e))?;
         return Ok((NetInput::Net(Box::new(surface)), net.unit, Vec::new()));
     }
-    let (mesh, unit, warnings) = read_mesh(path)?;
+    let (mesh, unit, warnings) = read_mesh(context, path)?;
     Ok((NetInput::Mesh(mesh), unit, warnings))
 }
 
 /// Reads the one mesh of a file.
-pub(crate) fn read_mesh(path: &Path) -> Result<(PolyMesh, LengthUnit, Vec<String>), Failure> {
-    let model = exchange::read_model(path).map_err(|e| Failure::input(path, e))?;
+pub(crate) fn read_mesh(
+    context: &Context,
+    path: &Path,
+) -> Result<(PolyMesh, LengthUnit, Vec<String>), Failure> {
+    let model = context.read_model(path)?;
     let mut with_faces = model.meshes.iter().filter(|m| !m.faces.is_empty());
     let (Some(mesh), None) = (with_faces.next(), with_faces.next()) else {
         return Err(Failure::input(

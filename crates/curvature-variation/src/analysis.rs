@@ -130,7 +130,7 @@ fn patch_statistics(
         });
         match curvatures {
             Ok((h, k)) => out.add(jet.position(), area, h, k),
-            Err(_) => out.add_singular(jet.position()),
+            Err(_) => out.add_singular(jet.position(), area),
         }
     }
     out

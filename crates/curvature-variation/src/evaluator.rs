@@ -3,7 +3,7 @@
 use crate::density::Density;
 use crate::functional::{Coefficients, Energy, Functional};
 use crate::guides::Guides;
-use crate::kernel::{GRADIENT_LEN, PatchRun, Task};
+use crate::kernel::{DensityRun, GRADIENT_LEN, PatchRun, Task};
 use crate::rules::{Quadrature, SeparableRule, Table};
 use pulp::Arch;
 use rayon::prelude::*;
@@ -408,23 +408,93 @@ impl SurfaceEnergy {
         stop: &mut dyn FnMut() -> bool,
     ) -> Option<EnergyTable> {
         let area = self.area(positions, work);
-        let value = |functional: Functional, work: &mut Workspace| {
-            if functional == Functional::Area {
-                return area;
-            }
-            let (mut density, scaled) = functional.density();
-            fix_epsilon(&mut density, area);
-            let [_, integral] = self.pass(positions, Task::Energy(&density), work);
-            if scaled { area * integral } else { integral }
-        };
-        let mut values = Vec::with_capacity(Functional::ALL.len());
-        for functional in Functional::ALL {
-            if stop() {
-                return None;
-            }
-            values.push((functional, value(functional, work)));
+        if stop() {
+            return None;
         }
-        Some(EnergyTable { values })
+        let others = Functional::ALL.into_iter().filter(|f| *f != Functional::Area);
+        let (densities, scaled): (Vec<Density>, Vec<bool>) = others
+            .map(Functional::density)
+            .map(|(mut density, scaled)| {
+                fix_epsilon(&mut density, area);
+                (density, scaled)
+            })
+            .unzip();
+        let integrals = self.integrals(positions, &densities, work);
+        let mut integrals = integrals.into_iter().zip(scaled);
+        let mut value = |functional: Functional| match functional {
+            Functional::Area => area,
+            _ => integrals.next().map_or(f64::NAN, |(i, scaled)| if scaled { area * i } else { i }),
+        };
+        Some(EnergyTable { values: Functional::ALL.map(|f| (f, value(f))).to_vec() })
+    }
+
+    /// Integrals of several densities.
+    fn integrals(
+        &self,
+        positions: &[f64],
+        densities: &[Density],
+        work: &mut Workspace,
+    ) -> Vec<f64> {
+        assert_eq!(positions.len(), 3 * self.vertex_count, "three coordinates per vertex");
+        let mut points = std::mem::take(&mut work.points);
+        let positions = if self.guides.is_empty() {
+            positions
+        } else {
+            self.guides.extend(positions, &mut points);
+            &points[..]
+        };
+        let width = densities.len();
+        let mut all = vec![0.0; width * self.patch_count];
+        let mut rest = &mut all[..];
+        let mut runs = Vec::new();
+        for group in &self.groups {
+            let (now, after) = std::mem::take(&mut rest).split_at_mut(width * group.patches());
+            rest = after;
+            let shares = group.controls.chunks(group.run * group.per_patch);
+            let places = group.places.chunks(group.run * group.per_patch);
+            let now = now.chunks_mut(group.run * width);
+            runs.extend(shares.zip(places).zip(now).map(|(share, out)| (group, share, out)));
+        }
+        let arch = self.arch;
+        runs.into_par_iter().for_each(|(group, (controls, places), integrals)| {
+            let per_patch = group.per_patch;
+            match &group.rule {
+                Rule::Table(rule) => {
+                    let rule = &**rule;
+                    let run =
+                        DensityRun { rule, densities, positions, controls, per_patch, integrals };
+                    arch.dispatch(run);
+                }
+                Rule::Separable(rule) => {
+                    let mut found = [[0.0; 2]; RUN];
+                    let patches = controls.len() / per_patch;
+                    for (k, density) in densities.iter().enumerate() {
+                        arch.dispatch(PatchRun {
+                            rule,
+                            task: Task::Energy(density),
+                            positions,
+                            controls,
+                            places,
+                            per_patch,
+                            integrals: &mut found[..patches],
+                            gradients: &mut [],
+                        });
+                        for (out, [_, integral]) in integrals.chunks_mut(width).zip(found) {
+                            out[k] = integral;
+                        }
+                    }
+                }
+            }
+        });
+        let mut totals = vec![0.0; width];
+        for group in &self.groups {
+            let range = width * group.first_patch..width * (group.first_patch + group.patches());
+            for patch in all[range].chunks(width) {
+                totals.iter_mut().zip(patch).for_each(|(t, i)| *t += group.multiplicity * i);
+            }
+        }
+        work.points = points;
+        totals
     }
 
     /// `∫ |K| dA`, the scale a Gauss-Bonnet residual is compared with.

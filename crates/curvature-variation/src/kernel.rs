@@ -184,6 +184,47 @@ impl WithSimd for PatchRun<'_, Table> {
     }
 }
 
+/// Integrals of several densities over a run of patches of a table: its derivatives, which are most
+/// of the work where many control points meet, are computed once for all of them.
+pub(crate) struct DensityRun<'a> {
+    pub(crate) rule: &'a Table,
+    pub(crate) densities: &'a [Density],
+    pub(crate) positions: &'a [f64],
+    /// Control points, patch after patch.
+    pub(crate) controls: &'a [u32],
+    pub(crate) per_patch: usize,
+    /// One value per density, patch after patch.
+    pub(crate) integrals: &'a mut [f64],
+}
+
+impl WithSimd for DensityRun<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, simd: S) {
+        align_frame();
+        let (count, rule) = (self.per_patch, self.rule);
+        let (values, _) = S::as_simd_f64s(&rule.values);
+        let (weights, _) = S::as_simd_f64s(&rule.weights);
+        let mut points = vec![[0.0; 3]; count];
+        let mut sums = vec![Aligned(Lanes::splat(simd, 0.0)); self.densities.len()];
+        let patches = self.controls.chunks_exact(count);
+        for (controls, out) in patches.zip(self.integrals.chunks_exact_mut(sums.len())) {
+            gather(self.positions, controls, &mut points);
+            sums.fill(Aligned(Lanes::splat(simd, 0.0)));
+            for (chunk, &w) in weights.iter().enumerate() {
+                let place = rule.chunk(chunk, S::F64_LANES);
+                let shape = Shape::new(&table_derivatives(simd, values, place, &points, 3));
+                let weight = Lanes::new(simd, w);
+                for (sum, density) in sums.iter_mut().zip(self.densities) {
+                    sum.0 = sum.0 + shape.density(density, weight).0;
+                }
+            }
+            out.iter_mut().zip(&sums).for_each(|(out, sum)| *out = sum.0.sum());
+        }
+    }
+}
+
 /// The values of a basis function at one node of a rule: `[order][k]`, the same in all lanes.
 type Basis<S> = [[Lanes<S>; 4]; 4];
 

@@ -43,7 +43,7 @@ pub fn read_model(path: &Path) -> Result<Model, ReadError> {
 /// # Errors
 /// As [`read_model`].
 pub fn decode_model(extension: &str, bytes: Vec<u8>) -> Result<Model, ReadError> {
-    match extension {
+    let model = match extension {
         "ron" => read_scene(&into_text(bytes)?),
         "step" | "stp" => read_step(&bytes),
         "obj" => read_obj(&into_text(bytes)?).map(of_mesh),
@@ -53,7 +53,9 @@ pub fn decode_model(extension: &str, bytes: Vec<u8>) -> Result<Model, ReadError>
         "glb" => read_glb(&bytes),
         "json" => read_json(&into_text(bytes)?),
         _ => Err(ReadError::UnknownFormat { extension: extension.into(), known: READABLE }),
-    }
+    }?;
+    crate::meaning::check(&model)?;
+    Ok(model)
 }
 
 /// Refuses extensions that [`encode_model`] does not know: to be asked before a long computation.

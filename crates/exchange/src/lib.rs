@@ -22,6 +22,8 @@ mod files;
 mod format;
 mod glb;
 mod json;
+mod meaning;
+mod mend;
 mod mesh;
 mod model;
 mod net;
@@ -47,6 +49,7 @@ pub use format::{
 };
 pub use glb::{read_glb, write_glb};
 pub use json::{read_json, write_compas, write_geomdl};
+pub use mend::WELD_SHARE;
 pub use mesh::{Field, Group, IndexLists, Mesh};
 pub use model::{Model, NamedSurface, PointGrid};
 pub use net::{Net, read_net, write_net};

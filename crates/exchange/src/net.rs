@@ -70,6 +70,7 @@ pub fn read_net(text: &str) -> Result<Net, ReadError> {
         }
     };
     let (vertices, normals) = (vectors(net.vertices, "vertex")?, vectors(net.normals, "normal")?);
+    crate::meaning::check_points("vertex", "vertices coincide, so the net", &vertices)?;
     let count = |name: &str, found: usize, needed: usize| {
         let what = format!("{found} {name} for {needed}");
         if found == needed { Ok(()) } else { Err(ReadError::content(what, "give one for each")) }

@@ -1,7 +1,7 @@
 //! Surfaces as meshes with exact normals and curvatures, for formats that know no splines.
 
 use crate::mesh::{Field, IndexLists, Mesh};
-use bspline::{BsplineSurface, KnotVector};
+use bspline::{BsplineSurface, KnotVector, SurfaceCurvature};
 use geom_core::{SurfaceJet, principal_curvatures};
 
 /// Most cells in one direction of a sampled surface.
@@ -12,8 +12,8 @@ const BESIDE: f64 = 1e-4;
 /// Quads over a grid of `cells` (u, v) equal parameter cells, by default about four per knot span,
 /// with exact unit normals `S_u × S_v` and the fields `H`, `K`, `k1`, `k2` per vertex.
 ///
-/// At a singular point (a pole) normal and curvatures are taken slightly towards the middle of the
-/// domain, and are zero where that is singular too.
+/// At a singular point (a pole) the normal is taken slightly towards the middle of the domain, and so
+/// are the curvatures unless the pole has its own; they are zero where that is singular too.
 #[must_use]
 pub fn surface_mesh(name: &str, surface: &BsplineSurface, cells: Option<(usize, usize)>) -> Mesh {
     let (ku, kv) = (surface.knots_u(), surface.knots_v());
@@ -28,11 +28,20 @@ pub fn surface_mesh(name: &str, surface: &BsplineSurface, cells: Option<(usize, 
     };
     let mut fields = ["H", "K", "k1", "k2"]
         .map(|name| Field { name: name.to_owned(), values: Vec::with_capacity(jets.len()) });
+    let poles = surface.pole_sides();
+    let curvature = SurfaceCurvature::new(surface).ok();
     for (k, jet) in jets.iter().enumerate() {
         let (u, v) = (us[k / vs.len()], vs[k % vs.len()]);
+        // On a pole collapsed to rounding only the tangents are noise.
+        let on_pole = surface.is_on_pole(&poles, [u, v]);
+        let measured = if on_pole { None } else { measure(jet) };
         let measured =
-            measure(jet).or_else(|| measure(&surface.jet(inwards(ku, u), inwards(kv, v), 2)));
-        let (normal, values) = measured.unwrap_or_default();
+            measured.or_else(|| measure(&surface.jet(inwards(ku, u), inwards(kv, v), 2)));
+        let (normal, mut values) = measured.unwrap_or_default();
+        if on_pole && let Some((h, k)) = curvature.as_ref().and_then(|c| c.at(u, v).ok()) {
+            let half = (h * h - k).max(0.0).sqrt();
+            values = [h, k, h + half, h - half];
+        }
         mesh.normals.push(normal.into());
         fields.iter_mut().zip(values).for_each(|(field, value)| field.values.push(value));
     }

@@ -1,5 +1,7 @@
 //! Why a paneling was refused.
 
+use bspline::Crease;
+
 /// Why a paneling was refused.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
@@ -47,6 +49,9 @@ pub enum Error {
         "the surface is singular at ({u}, {v}), inside panel {panel}; cut the pole off or move its control points apart"
     )]
     Singular { panel: usize, u: f64, v: f64 },
+    /// A kink inside the surface.
+    #[error("the surface has {crease}, which no seam smooths; split it there and panel the pieces")]
+    Creased { crease: Crease },
     /// An option without meaning, such as a bound that no paneling can be measured against.
     #[error("`{name}` is {value}; it must be positive and finite")]
     BadOption { name: &'static str, value: f64 },

@@ -6,7 +6,13 @@ use crate::layout::tiling::Layout;
 use crate::mold::prices::PriceList;
 use crate::options::{Options, PANELS};
 use bspline::BsplineSurface;
+use geom_core::Cost;
 use gp_solver::Counts;
+
+/// Memory and microseconds of one core that a panel takes, measured on grids of 1,000 to 4,000
+/// panels.
+const BYTES_PER_PANEL: u64 = 64 << 10;
+const EVALUATIONS_PER_PANEL: u64 = 1100;
 
 /// What is to be panelled: a surface, or panels that are cut already; and what molds and panels
 /// cost. Made from either by reference.
@@ -63,6 +69,33 @@ impl<'a> Input<'a> {
     pub fn with_prices(mut self, prices: PriceList) -> Self {
         self.prices = prices;
         self
+    }
+
+    /// What a run would take, roughly: in proportion to the number of panels.
+    ///
+    /// ```
+    /// use paneling::{Input, Options};
+    /// let surface = fixtures::surfaces::Shape::Saddle.surface(10, 10, 4, 4);
+    /// let panels = Some(gp_solver::Counts { u: 2000, v: 2000 });
+    /// let cost = Input::from(&surface).cost(&Options { panels, ..Options::default() });
+    /// assert!(cost.bytes > 200 << 30 && cost.evaluations > 3_600_000_000);
+    /// ```
+    #[must_use]
+    pub fn cost(&self, options: &Options) -> Cost {
+        let faces = match self.cut {
+            Cut::Panels(panels) => panels.len(),
+            Cut::Surface(_, Some(layout)) => layout.len(),
+            Cut::Surface(_, None) => {
+                let Counts { u, v } = options.panels.unwrap_or(PANELS);
+                u.saturating_mul(v)
+            }
+        } as u64;
+        Cost {
+            bytes: faces.saturating_mul(BYTES_PER_PANEL),
+            evaluations: faces.saturating_mul(EVALUATIONS_PER_PANEL),
+            vertices: faces,
+            faces,
+        }
     }
 
     /// The panels, cut as the options say.

@@ -1,6 +1,6 @@
 //! Why an optimisation cannot be attempted.
 
-use bspline::{FitError, KnotError, SplineError};
+use bspline::{Crease, FitError, KnotError, SplineError};
 use gp_solver::SolverError;
 
 /// What makes it impossible to attempt an optimisation. Not converging is a status, not an error.
@@ -14,6 +14,11 @@ pub enum Error {
          cut the pole off or spread the control points that coincide"
     )]
     Singular { u: f64, v: f64 },
+    /// A kink inside the surface.
+    #[error(
+        "the surface has {crease}; split it there and work on the smooth pieces, or refit it without the knots that allow the crease"
+    )]
+    Creased { crease: Crease },
     /// All control points in one place.
     #[error("all control points coincide, so the surface has no extent; check the coordinates")]
     NoExtent,

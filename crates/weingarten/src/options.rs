@@ -1,5 +1,7 @@
 //! Settings of an optimisation.
 
+use bspline::BsplineSurface;
+use geom_core::Cost;
 use gp_solver::{Counts, List, ListItem, OptionValue, choices, options, serde_as_text};
 use serde::{Deserialize, Serialize};
 
@@ -9,6 +11,11 @@ use crate::relation::Relation;
 /// Most control points or samples in one direction: enough for any design, and far below what
 /// could exhaust the memory by mistake.
 const MOST_PER_DIRECTION: usize = 2000;
+
+/// Memory of a sample with its derivatives and rows.
+const BYTES_PER_SAMPLE: f64 = 4000.0;
+/// Floating-point operations of a microsecond of one core.
+const FLOPS_PER_EVALUATION: f64 = 2000.0;
 
 /// Which form of the same problem is solved.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
@@ -192,6 +199,34 @@ impl Options {
             }
         }
         Ok(())
+    }
+}
+
+impl Options {
+    /// What a run on `surface` would take, roughly: the factor of the normal matrix, whose band is
+    /// as wide as the shorter side of the net, and the samples.
+    #[must_use]
+    pub fn cost(&self, surface: &BsplineSurface) -> Cost {
+        let own = [Counts { u: surface.n_u(), v: surface.n_v() }];
+        let nets = if self.levels.is_empty() { &own[..] } else { &self.levels };
+        let order = surface.degree_u().order().max(surface.degree_v().order());
+        let mut cost = Cost::default();
+        for net in nets {
+            let (long, short) = (net.u.max(net.v) as f64, net.u.min(net.v) as f64);
+            let unknowns = 3.0 * long * short;
+            let band = (3.0 * order as f64 * short).min(unknowns);
+            let samples = match self.samples {
+                Some(samples) => samples.u as f64 * samples.v as f64,
+                None => 4.0 * long * short,
+            };
+            let flops = unknowns * band * band + samples * (9 * order.pow(4)) as f64;
+            let bytes = 8.0 * unknowns * band + samples * BYTES_PER_SAMPLE;
+            cost.bytes = cost.bytes.max(bytes as u64);
+            let steps = self.iterations as f64;
+            cost.evaluations =
+                cost.evaluations.saturating_add((steps * flops / FLOPS_PER_EVALUATION) as u64);
+        }
+        cost
     }
 }
 

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use bspline::BsplineSurface;
+use bspline::{BsplineSurface, Side};
 use geom_core::{BoundingBox, FirstForm};
 use gp_solver::Counts;
 
@@ -33,7 +33,8 @@ impl SampledSurface {
     /// the counts allow.
     ///
     /// # Errors
-    /// [`Error::Singular`] at a pole, a cusp or a collapsed edge, [`Error::NoExtent`].
+    /// [`Error::Singular`] at a pole, a cusp or a collapsed edge, [`Error::Creased`],
+    /// [`Error::NoExtent`].
     ///
     /// ```
     /// use gp_solver::{Counts, check_jacobian};
@@ -46,6 +47,7 @@ impl SampledSurface {
     /// # Ok::<(), Box<dyn std::error::Error>>(())
     /// ```
     pub fn new(surface: &BsplineSurface, samples: Counts) -> Result<Self, Error> {
+        check_smooth(surface)?;
         let grid = Arc::new(SampleGrid::uniform(surface, [samples.u, samples.v]));
         let x = coordinates(surface);
         let samples = regular_samples(&grid, &x)?;
@@ -75,6 +77,22 @@ pub(crate) fn regular_samples(grid: &SampleGrid, x: &[f64]) -> Result<Vec<Sample
         }
         None => Ok(samples),
     }
+}
+
+/// Refuses poles, also those that collapse to rounding only, and creases: between the samples
+/// nobody would see them.
+pub(crate) fn check_smooth(surface: &BsplineSurface) -> Result<(), Error> {
+    let (u, v) = (surface.knots_u().domain(), surface.knots_v().domain());
+    if let Some(side) = surface.pole_sides().first() {
+        let (u, v) = match side {
+            Side::StartU | Side::StartV => (u.0, v.0),
+            Side::EndU => (u.1, v.0),
+            Side::EndV => (u.0, v.1),
+        };
+        return Err(Error::Singular { u, v });
+    }
+    let sharpest = surface.creases().into_iter().max_by(|a, b| a.angle.total_cmp(&b.angle));
+    sharpest.map_or(Ok(()), |crease| Err(Error::Creased { crease }))
 }
 
 /// Samples in u and v: as asked for, or twice the control points.

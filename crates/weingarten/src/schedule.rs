@@ -8,7 +8,7 @@ use crate::error::Error;
 use crate::grid::SampleGrid;
 use crate::level::Level;
 use crate::options::{Move, Options};
-use crate::sampled::{curvature_size, extent, regular_samples, sample_counts};
+use crate::sampled::{check_smooth, curvature_size, extent, regular_samples, sample_counts};
 use crate::variables::{coordinates, scaled};
 
 /// Mean absolute principal curvature on the working scale (Pellis et al. 2021, Table 1).
@@ -99,6 +99,7 @@ fn uniform_like(like: &KnotVector, n: usize) -> Result<KnotVector, KnotError> {
 /// Working lengths per length of the model.
 fn working_unit(surface: &BsplineSurface, samples: Option<Counts>) -> Result<f64, Error> {
     let extent = extent(surface)?;
+    check_smooth(surface)?;
     let grid = SampleGrid::uniform(surface, sample_counts(surface, samples));
     let samples = regular_samples(&grid, &coordinates(surface))?;
     let curvature = curvature_size(surface, &samples)?;

@@ -1,18 +1,19 @@
 //! `umbilic analyze INPUT`.
 
 use crate::args::ReportArgs;
+use crate::commands::fair::{samples_of, view};
 use crate::context::Context;
 use crate::failure::Failure;
 use crate::outcome::{Outcome, Status};
 use crate::report_support;
 use curvature_variation::{Rings, SurfaceAnalysis, fitted_torus};
 use exchange::{Mesh, Model};
-use geom_core::{CurvatureStatistics, ValueRange, mesh_curvature_statistics};
+use geom_core::{CurvatureStatistics, DVec3, PolyMesh, ValueRange, mesh_curvature_statistics};
 use gp_solver::OptionValue;
 use serde::Serialize;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
-use subdiv_catmull_clark::Blend;
+use subdiv_catmull_clark::{Blend, SubdivisionSurface};
 
 /// Arguments of `analyze`.
 #[derive(Debug, clap::Args)]
@@ -39,10 +40,9 @@ pub(crate) struct Analyze {
 impl Analyze {
     pub(crate) fn run(self, context: &Context) -> Result<Outcome, Failure> {
         self.report.check()?;
-        let model =
-            exchange::read_model(&self.input).map_err(|e| Failure::input(&self.input, e))?;
+        let model = context.read_model(&self.input)?;
         let rings = self.blend_rings.and_then(Rings::count);
-        let Measured { kind, statistics, subdivision, warnings } =
+        let Measured { kind, statistics, subdivision, limit, warnings } =
             measure(&self.input, &model, rings)?;
         let mut metrics = AnalyzeMetrics::new(kind, &statistics);
         metrics.subdivision = subdivision;
@@ -57,14 +57,22 @@ impl Analyze {
         outcome.warnings.extend(warnings);
         if statistics.singular > 0 {
             outcome.warnings.push(format!(
-                "{} of {} points are singular and have no curvature",
+                "{} of {} points are singular and have no curvature; they stand for {:.2} % of the area",
                 statistics.singular,
-                statistics.singular + statistics.samples
+                statistics.singular + statistics.samples,
+                100.0 * statistics.singular_area / statistics.area.max(f64::MIN_POSITIVE)
             ));
         }
         if self.report.wanted() {
             let mut report = report_support::new("Curvature analysis");
-            report_support::add_model(&mut report, &model)?;
+            match limit {
+                Some((mesh, surface)) => {
+                    report.length_unit = model.unit.to_string();
+                    let samples = samples_of(&mesh, &surface);
+                    report.stages.push(view("limit surface", &samples, &report.length_unit)?);
+                }
+                None => report_support::add_model(&mut report, &measured_only(model))?,
+            }
             report_support::add_files(&mut outcome, &self.report, context, report)?;
         }
         Ok(outcome)
@@ -76,7 +84,18 @@ struct Measured {
     kind: &'static str,
     statistics: CurvatureStatistics,
     subdivision: Option<SubdivisionMetrics>,
+    /// The subdivision surface with its control mesh.
+    limit: Option<(PolyMesh, SubdivisionSurface)>,
     warnings: Vec<String>,
+}
+
+/// The model without curvatures its file may hold: the page shows those that were measured.
+fn measured_only(mut model: Model) -> Model {
+    let curvatures = ["H", "K", "k1", "k2", "K1", "K2"];
+    for mesh in &mut model.meshes {
+        mesh.vertex_fields.retain(|field| !curvatures.contains(&field.name.as_str()));
+    }
+    model
 }
 
 fn measure(path: &Path, model: &Model, rings: Option<usize>) -> Result<Measured, Failure> {
@@ -85,10 +104,14 @@ fn measure(path: &Path, model: &Model, rings: Option<usize>) -> Result<Measured,
     if !model.surfaces.is_empty() {
         for named in &model.surfaces {
             statistics.merge(&named.surface.curvature_statistics());
+            let name = if named.name.is_empty() { "surface" } else { &named.name };
+            let creases = named.surface.creases();
+            let split = "split it there before a method that needs smoothness";
+            warnings.extend(creases.iter().map(|c| format!("{name} has {c}; {split}")));
         }
         let rational = model.surfaces.iter().any(|named| named.surface.is_rational());
         let kind = if rational { "rational_bspline_surface" } else { "bspline_surface" };
-        return Ok(Measured { kind, statistics, subdivision, warnings });
+        return Ok(Measured { kind, statistics, subdivision, limit: None, warnings });
     }
     let with_faces: Vec<&Mesh> = model.meshes.iter().filter(|m| !m.faces.is_empty()).collect();
     let corners = |n: usize| with_faces.iter().all(|m| m.faces.iter().all(|f| f.len() == n));
@@ -101,7 +124,8 @@ fn measure(path: &Path, model: &Model, rings: Option<usize>) -> Result<Measured,
                 subdivision = Some(SubdivisionMetrics::new(&found));
                 let statistics = found.statistics;
                 let kind = "subdivision_surface";
-                return Ok(Measured { kind, statistics, subdivision, warnings });
+                let limit = Some((found.mesh, found.surface));
+                return Ok(Measured { kind, statistics, subdivision, limit, warnings });
             }
             Err(error) => warnings.push(format!(
                 "the mesh has no Catmull-Clark surface to measure, so its vertices are: {error}"
@@ -125,7 +149,7 @@ fn measure(path: &Path, model: &Model, rings: Option<usize>) -> Result<Measured,
         _ if corners(3) => "triangle_mesh",
         _ => "polygon_mesh",
     };
-    Ok(Measured { kind, statistics, subdivision, warnings })
+    Ok(Measured { kind, statistics, subdivision, limit: None, warnings })
 }
 
 fn discrete_energy(path: &Path, model: &Model) -> Result<f64, Failure> {
@@ -211,7 +235,18 @@ struct AnalyzeMetrics {
     principal_curvature_min: Option<f64>,
     principal_curvature_max: Option<f64>,
     principal_curvature_mean_abs: Option<f64>,
+    mean_curvature_p01: Option<f64>,
+    mean_curvature_p99: Option<f64>,
+    gaussian_curvature_p01: Option<f64>,
+    gaussian_curvature_p99: Option<f64>,
+    principal_curvature_p01: Option<f64>,
+    principal_curvature_p99: Option<f64>,
+    mean_curvature_min_at: Option<[f64; 3]>,
+    mean_curvature_max_at: Option<[f64; 3]>,
+    gaussian_curvature_min_at: Option<[f64; 3]>,
+    gaussian_curvature_max_at: Option<[f64; 3]>,
     singular_points: usize,
+    singular_area: f64,
     #[serde(flatten)]
     subdivision: Option<SubdivisionMetrics>,
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -238,7 +273,18 @@ impl AnalyzeMetrics {
             principal_curvature_min: principal.map(|r| r.min),
             principal_curvature_max: principal.map(|r| r.max),
             principal_curvature_mean_abs: principal.map(|r| r.mean_abs),
+            mean_curvature_p01: mean.map(|r| r.low),
+            mean_curvature_p99: mean.map(|r| r.high),
+            gaussian_curvature_p01: gaussian.map(|r| r.low),
+            gaussian_curvature_p99: gaussian.map(|r| r.high),
+            principal_curvature_p01: principal.map(|r| r.low),
+            principal_curvature_p99: principal.map(|r| r.high),
+            mean_curvature_min_at: mean.map(|r| r.min_at.to_array()),
+            mean_curvature_max_at: mean.map(|r| r.max_at.to_array()),
+            gaussian_curvature_min_at: gaussian.map(|r| r.min_at.to_array()),
+            gaussian_curvature_max_at: gaussian.map(|r| r.max_at.to_array()),
             singular_points: statistics.singular,
+            singular_area: statistics.singular_area,
             subdivision: None,
             discrete_bending: None,
         }
@@ -285,12 +331,23 @@ fn summary(
                 number(r.max),
                 number(r.mean_abs)
             ));
+            lines.push(format!(
+                "    on 98 % of the area {} to {}; least near {}, largest near {}",
+                number(r.low),
+                number(r.high),
+                place(r.min_at),
+                place(r.max_at)
+            ));
         }
     };
     row("mean curvature     ", statistics.mean_curvature(), "");
     row("Gaussian curvature ", statistics.gaussian_curvature(), "²");
     row("principal curvature", statistics.principal_curvature(), "");
     lines
+}
+
+fn place(p: DVec3) -> String {
+    format!("({:.4}, {:.4}, {:.4})", p.x, p.y, p.z)
 }
 
 /// Six decimals, or powers of ten beside a pole.

@@ -55,7 +55,7 @@ impl Darboux {
         self.report.check()?;
         net_files::check_outputs(&self.output.output, &["glb", "obj", "ply", "stl"])?;
         let options = self.options()?;
-        let (input, unit, mut warnings) = net_files::read(&self.input)?;
+        let (input, unit, mut warnings) = net_files::read(context, &self.input)?;
         let mut watch = Watch::new(context, "net");
         let (surface, status, steps) = match input {
             NetInput::Net(surface) => (*surface, Status::Converged, 0),

@@ -72,9 +72,9 @@ impl Fair {
                 "--family leaves no vertex to fix; drop --fix, --creases and --clamp-boundary",
             ));
         }
-        let mut model =
-            exchange::read_model(&self.input).map_err(|e| Failure::input(&self.input, e))?;
-        let input = self.read(&mut model)?;
+        let mut model = context.read_model(&self.input)?;
+        let input = self.read(context, &mut model)?;
+        context.afford(input.cost(&options), "levels")?;
         let mut watch = Watch::new(context, "fairing").with_checkpoints(&self.checkpoint)?;
         let mut result =
             solve(&input, &options, &mut watch).map_err(|e| refused::<Options>(&self.input, e))?;
@@ -118,7 +118,7 @@ impl Fair {
 
 impl Fair {
     /// The mesh and what the files say of it; a note on them joins the model's warnings.
-    fn read(&self, model: &mut Model) -> Result<Input, Failure> {
+    fn read(&self, context: &Context, model: &mut Model) -> Result<Input, Failure> {
         let mesh = read_control_mesh(&self.input, model)?;
         let creases = match &self.files.creases {
             None => Creases::none(),
@@ -141,7 +141,7 @@ impl Fair {
                 Some(declared.matrices)
             }
         };
-        let members = self.files.family.iter().map(|path| read_member(path));
+        let members = self.files.family.iter().map(|path| read_member(context, path));
         let members = members.collect::<Result<Vec<_>, _>>()?;
         Ok(Input { mesh, creases, constraints, members, symmetries })
     }
@@ -167,8 +167,8 @@ fn read_control_mesh(path: &Path, model: &Model) -> Result<geom_core::PolyMesh, 
 }
 
 /// A further mesh of `--family`.
-fn read_member(path: &Path) -> Result<geom_core::PolyMesh, Failure> {
-    let model = exchange::read_model(path).map_err(|e| Failure::input(path, e))?;
+fn read_member(context: &Context, path: &Path) -> Result<geom_core::PolyMesh, Failure> {
+    let model = context.read_model(path)?;
     read_control_mesh(path, &model)
 }
 
@@ -278,7 +278,10 @@ fn content_for(
     }
 }
 
-fn samples_of(mesh: &geom_core::PolyMesh, surface: &SubdivisionSurface) -> SurfaceSamples {
+pub(crate) fn samples_of(
+    mesh: &geom_core::PolyMesh,
+    surface: &SubdivisionSurface,
+) -> SurfaceSamples {
     let side = report_support::jets::JetGrid::side_for(mesh.face_count()).min(12);
     SurfaceSamples::new(mesh, surface, side)
 }
@@ -327,7 +330,11 @@ fn umbilics(samples: &SurfaceSamples) -> String {
     text
 }
 
-fn view(name: &str, samples: &SurfaceSamples, unit: &str) -> Result<SurfaceView, Failure> {
+pub(crate) fn view(
+    name: &str,
+    samples: &SurfaceSamples,
+    unit: &str,
+) -> Result<SurfaceView, Failure> {
     let drawn = |error| Failure::other(format!("cannot draw the result: {error}"));
     let variation = ScalarField {
         id: "variation".to_owned(),

@@ -57,8 +57,7 @@ impl Fit {
         self.report.check()?;
         let options = self.options.options(&self.config)?;
         let settings = settings(&options)?;
-        let model =
-            exchange::read_model(&self.input).map_err(|e| Failure::input(&self.input, e))?;
+        let model = context.read_model(&self.input)?;
         let data = points(&model).map_err(|e| Failure::input(&self.input, e))?;
         let fit = fit_grid(&data.points, data.n_u, data.n_v, data.closed_u, &settings)
             .map_err(|e| Failure::input(&self.input, e))?;

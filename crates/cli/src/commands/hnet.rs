@@ -47,14 +47,14 @@ impl Hnet {
         let options = self.options.options(&self.config)?;
         let refused = |e: hyperbolic_nets::Error| option_flags::refused::<Options>(&self.input, e);
         options.check().map_err(refused)?;
-        let (input, unit, mut warnings) = net_files::read(&self.input)?;
+        let (input, unit, mut warnings) = net_files::read(context, &self.input)?;
         let net = match input {
             NetInput::Net(surface) => surface.net().clone(),
             NetInput::Mesh(mesh) => QuadNet::new(&mesh).map_err(refused)?,
         };
         let reference = match &self.reference {
             None => None,
-            Some(path) => Some(TriMesh::from_poly_mesh(&net_files::read_mesh(path)?.0)),
+            Some(path) => Some(TriMesh::from_poly_mesh(&net_files::read_mesh(context, path)?.0)),
         };
         let input = match &reference {
             None => Input::new(&net),

@@ -86,6 +86,7 @@ impl Panel {
         if let Some(layout) = &layout {
             input = input.with_layout(layout);
         }
+        context.afford(input.cost(&options), "panels")?;
         let mut watch = Watch::new(context, "panelling").with_checkpoints(&self.checkpoint)?;
         let solution = solve(input, &options, &mut watch).map_err(|e| {
             let file = match (&e, &self.prices) {

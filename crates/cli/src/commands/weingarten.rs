@@ -47,6 +47,7 @@ impl Weingarten {
         self.report.check()?;
         let options = self.options.options(&self.config)?;
         let (model, named) = read_surface(&self.input)?;
+        context.afford(options.cost(&named.surface), "levels")?;
         let mut watch = Watch::new(context, "optimising")
             .with_checkpoints(&self.checkpoint)?
             .with_systems(self.system.dump_system.as_deref())?;

@@ -1,9 +1,10 @@
 //! Views of smooth surfaces, sampled with their exact normals and curvatures.
 
 use crate::failure::{Failure, refused};
-use bspline::{BsplineSurface, KnotVector};
+use bspline::{BsplineSurface, KnotVector, SurfaceCurvature};
 use geom_core::{DVec2, DVec3, SurfaceJet, asymptotic_directions, principal_curvatures};
 use report::{FaceGroups, LineRole, LineSet, ScalarField, SurfaceView};
+use std::collections::BTreeMap;
 
 /// Vertices aimed at for a whole view: fine enough to look smooth, small enough for a page.
 const VERTICES: f64 = 12_000.0;
@@ -18,6 +19,8 @@ pub(crate) struct JetGrid {
     pub(crate) jets: Vec<SurfaceJet>,
     pub(crate) rows: usize,
     pub(crate) columns: usize,
+    /// H and K of places, such as poles, whose jets do not hold them.
+    pub(crate) known: BTreeMap<usize, (f64, f64)>,
 }
 
 impl JetGrid {
@@ -27,9 +30,10 @@ impl JetGrid {
     }
 }
 
-/// `jet`, or the position of `jet` with the derivatives from just inside where it is singular.
-fn regular(jet: SurfaceJet, inside: impl Fn() -> SurfaceJet) -> SurfaceJet {
-    if jet.normal().is_ok() {
+/// `jet`, or the position of `jet` with the derivatives from just inside where it is singular or
+/// `on_pole`, where the tangents may be noise.
+fn regular(jet: SurfaceJet, on_pole: bool, inside: impl Fn() -> SurfaceJet) -> SurfaceJet {
+    if jet.normal().is_ok() && !on_pole {
         return jet;
     }
     let mut moved = inside();
@@ -50,11 +54,18 @@ pub(crate) fn jets_view(
     for (patch, grid) in grids.iter().enumerate() {
         let base = positions.len() as u32;
         let mut sound = Vec::with_capacity(grid.jets.len());
-        for jet in &grid.jets {
+        for (place, jet) in grid.jets.iter().enumerate() {
             let normal = jet.normal();
             sound.push(normal.is_ok() && jet.position().is_finite());
             positions.push(if jet.position().is_finite() { jet.position() } else { DVec3::ZERO });
             normals.push(normal.unwrap_or(DVec3::Z));
+            if let Some(&(mean, gaussian)) = grid.known.get(&place) {
+                let half = (mean * mean - gaussian).max(0.0).sqrt();
+                let all = [(&mut h, mean), (&mut k, gaussian)];
+                let all = all.into_iter().chain([(&mut k1, mean + half), (&mut k2, mean - half)]);
+                all.for_each(|(list, value)| list.push(value));
+                continue;
+            }
             h.push(jet.mean_curvature().unwrap_or(f64::NAN));
             k.push(jet.gaussian_curvature().unwrap_or(f64::NAN));
             let second = jet.second_form();
@@ -107,10 +118,16 @@ pub(crate) fn spline_view(
         let v = parameters(surface.knots_v(), side);
         let mut jets = surface.jet_grid(&u, &v, 2);
         let middle = [mid(surface.knots_u()), mid(surface.knots_v())];
+        let (poles, curvature) = (surface.pole_sides(), SurfaceCurvature::new(surface).ok());
+        let mut known = BTreeMap::new();
         for (index, jet) in jets.iter_mut().enumerate() {
             let (u, v) = (u[index / v.len()], v[index % v.len()]);
             let inside = |t: f64, m: f64| t + INSIDE * (m - t);
-            *jet = regular(*jet, || surface.jet(inside(u, middle[0]), inside(v, middle[1]), 2));
+            let on_pole = surface.is_on_pole(&poles, [u, v]);
+            let curvatures = curvature.as_ref().filter(|_| on_pole).and_then(|c| c.at(u, v).ok());
+            known.extend(curvatures.map(|c| (index, c)));
+            let beside = || surface.jet(inside(u, middle[0]), inside(v, middle[1]), 2);
+            *jet = regular(*jet, on_pole, beside);
         }
         if let Some(from) = reference {
             let distance = jets.iter().zip(from[i].point_grid(&u, &v));
@@ -124,7 +141,7 @@ pub(crate) fn spline_view(
         }
         let lines = LineSet::control_net(surface.control_points(), surface.n_u(), surface.n_v());
         net.extend(lines.polylines);
-        grids.push(JetGrid { jets, rows: u.len(), columns: v.len() });
+        grids.push(JetGrid { jets, rows: u.len(), columns: v.len(), known });
     }
     let mut view = jets_view(name, &grids, length_unit)?;
     if reference.is_some() {
@@ -244,9 +261,9 @@ mod tests {
         };
         let jets = (0..20).map(|k| {
             let (u, v) = (f64::from(k / 5) / 3.0, f64::from(k % 5) / 4.0);
-            regular(cone(u, v), || cone(u + INSIDE, v))
+            regular(cone(u, v), false, || cone(u + INSIDE, v))
         });
-        let grid = JetGrid { jets: jets.collect(), rows: 4, columns: 5 };
+        let grid = JetGrid { jets: jets.collect(), rows: 4, columns: 5, ..JetGrid::default() };
         assert!(grid.jets.iter().all(|jet| jet.normal().is_ok()));
         let view = jets_view("cone", &[grid], "").unwrap();
         assert_eq!(view.triangles().len(), 24);

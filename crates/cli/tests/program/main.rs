@@ -10,6 +10,7 @@ mod dist;
 mod dist_example;
 mod every_command;
 mod fair;
+mod hard_input;
 mod hyperbolic;
 #[cfg(unix)]
 mod interruptions;

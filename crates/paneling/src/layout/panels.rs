@@ -94,8 +94,12 @@ impl PanelSet {
     /// Samples the panels of `layout` on `surface`.
     ///
     /// # Errors
-    /// [`Error::Singular`] where the surface has no normal.
+    /// [`Error::Singular`] where the surface has no normal, [`Error::Creased`] where it has two.
     pub fn new(surface: &BsplineSurface, layout: &Layout) -> Result<Self, Error> {
+        let sharpest = surface.creases().into_iter().max_by(|a, b| a.angle.total_cmp(&b.angle));
+        if let Some(crease) = sharpest {
+            return Err(Error::Creased { crease });
+        }
         let (edges, uses) = edges_of(layout.panels());
         let (start_u, end_u) = surface.knots_u().domain();
         let (start_v, end_v) = surface.knots_v().domain();
@@ -320,13 +324,16 @@ fn sample(
     panel: impl Fn(usize) -> usize,
 ) -> Result<Samples, Error> {
     let jets = surface.jets(parameters, 1);
+    let poles = surface.pole_sides();
     let mut samples = Samples::default();
     for (k, jet) in jets.iter().enumerate() {
-        let normal = jet.normal().map_err(|_| Error::Singular {
-            panel: panel(k),
-            u: parameters[k][0],
-            v: parameters[k][1],
-        })?;
+        let singular =
+            || Error::Singular { panel: panel(k), u: parameters[k][0], v: parameters[k][1] };
+        // On a pole collapsed to rounding only the normal is noise.
+        if surface.is_on_pole(&poles, parameters[k]) {
+            return Err(singular());
+        }
+        let normal = jet.normal().map_err(|_| singular())?;
         samples.points.push(jet.position());
         samples.normals.push(normal);
     }

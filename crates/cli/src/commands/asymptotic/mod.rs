@@ -50,7 +50,7 @@ impl Asymptotic {
         }
         let said = |e: &dyn std::fmt::Display| in_flags::<Options>(&e.to_string());
         options.check().map_err(|e| Failure::usage(said(&e)))?;
-        let (input, unit) = read_input(&self.data, &options)?;
+        let (input, unit, warnings) = read_input(context, &self.data, &options)?;
         let mut watch = Watch::new(context, "solving");
         let result = match solve(&input, &options, &mut watch) {
             Ok(result) => result,
@@ -63,6 +63,7 @@ impl Asymptotic {
         let mut outcome = Outcome::new(result.report.status, iterations)
             .with_input(&self.data)
             .with_metrics(&result.metrics)?;
+        outcome.warnings.extend(warnings);
         for path in self.output.output {
             let model = model_for(&path, &result, &unit)?;
             let bytes =
@@ -81,18 +82,21 @@ impl Asymptotic {
     }
 }
 
-fn read_input(path: &Path, options: &Options) -> Result<(Input, LengthUnit), Failure> {
+fn read_input(
+    context: &Context,
+    path: &Path,
+    options: &Options,
+) -> Result<(Input, LengthUnit, Vec<String>), Failure> {
     let refused = |e: &dyn std::fmt::Display| Failure::input(path, e);
     if options.from_net {
-        let (mesh, unit) = if exchange::extension_of(path) == "ron" {
+        let (mesh, unit, warnings) = if exchange::extension_of(path) == "ron" {
             let text = exchange::read_text(path).map_err(|e| refused(&e))?;
             let net = exchange::read_net(&text).map_err(|e| refused(&e))?;
-            (net.to_poly_mesh().map_err(|e| refused(&e))?, LengthUnit::default())
+            (net.to_poly_mesh().map_err(|e| refused(&e))?, LengthUnit::default(), Vec::new())
         } else {
-            let (mesh, unit, _) = crate::net_files::read_mesh(path)?;
-            (mesh, unit)
+            crate::net_files::read_mesh(context, path)?
         };
-        return Ok((mesh.into(), unit));
+        return Ok((mesh.into(), unit, warnings));
     }
     if exchange::extension_of(path) == "obj" {
         let model = exchange::read_model(path).map_err(|e| refused(&e))?;
@@ -101,7 +105,7 @@ fn read_input(path: &Path, options: &Options) -> Result<(Input, LengthUnit), Fai
         if polylines.is_empty() {
             return Err(refused(&"no polylines in this file; a quad mesh needs --from-net"));
         }
-        return Ok((polylines.into(), model.unit));
+        return Ok((polylines.into(), model.unit, model.warnings));
     }
     let file: DataFile = exchange::read_ron(path).map_err(|e| refused(&e))?;
     let unit = match &file.unit {
@@ -109,7 +113,7 @@ fn read_input(path: &Path, options: &Options) -> Result<(Input, LengthUnit), Fai
         Some(symbol) => LengthUnit::from_symbol(symbol)
             .ok_or_else(|| refused(&format!("unknown unit `{symbol}`; use mm, cm, m or in")))?,
     };
-    Ok((file.input().map_err(|e| refused(&e))?, unit))
+    Ok((file.input().map_err(|e| refused(&e))?, unit, Vec::new()))
 }
 
 /// The patches as clamped B-splines of one span.
