@@ -114,22 +114,21 @@ mod tests {
             0.3 * x - 0.1 * y + 0.5 * (2.0 * x * x - 3.0 * x * y + 5.0 * y * y) + x * x * y
                 - y * y * y
         };
-        for (degree, exact) in [(2, false), (3, true), (4, true)] {
+        for degree in [3, 4] {
             let fit = HeightFit::new(&grid(-2..3, height), degree).unwrap();
-            assert_eq!((fit.curvature[1] + 1.5).abs() < 1e-12, exact || degree == 2);
-            assert!(fit.gain < 10.0, "{fit:?}");
-            if exact {
-                assert_close(fit.slope[0], 0.3, 1e-12);
-                assert_close(fit.curvature[0], 2.0, 1e-12);
-                assert_close(fit.curvature[2], 5.0, 1e-12);
+            assert!(fit.gain < 20.0, "{fit:?}");
+            let found = [fit.slope[0], fit.slope[1], fit.curvature[0], fit.curvature[1]];
+            for (got, want) in found.into_iter().zip([0.3, -0.1, 2.0, -1.5]) {
+                assert_close(got, want, 1e-12);
             }
+            assert_close(fit.curvature[2], 5.0, 1e-12);
         }
     }
 
     #[test]
     fn terms_that_cannot_be_told_apart_have_a_large_gain() {
-        // On three rows x³ is x.
-        let rows = grid(-1..2, |x, _| x);
+        // On the rows 0, 1/2 and 1 to one side x³ is a combination of x² and x.
+        let rows = grid(0..3, |x, _| x);
         assert!(HeightFit::new(&rows, 3).is_none_or(|fit| fit.gain > 1e6));
         assert!(HeightFit::new(&rows, 2).unwrap().gain < 10.0);
         assert_eq!(HeightFit::new(&rows[..4], 2), None);

@@ -98,7 +98,7 @@ impl CreaseList {
         let above = |s: f64| s > LARGEST_SHARPNESS && s != INFINITE_SHARPNESS;
         let ((a, b), sharpness) = *self.edges.iter().find(|(_, s)| above(*s))?;
         Some(format!(
-            "edge {a}–{b} has sharpness {sharpness}; above {LARGEST_SHARPNESS} an edge counts as \
+            "edge {a}–{b} has sharpness {sharpness:e}; above {LARGEST_SHARPNESS} an edge counts as \
              infinitely sharp"
         ))
     }
@@ -277,7 +277,7 @@ mod tests {
         assert_eq!(creases.sharpness(VertexId(0), VertexId(1)), INFINITE_SHARPNESS);
         assert_eq!(
             huge.note().unwrap(),
-            "edge 0–1 has sharpness 1000000; above 48 an edge counts as infinitely sharp"
+            "edge 0–1 has sharpness 1e6; above 48 an edge counts as infinitely sharp"
         );
         assert_eq!(list(0, 1, f64::INFINITY).note(), None);
     }
