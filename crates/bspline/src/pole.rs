@@ -15,8 +15,8 @@ const COLLAPSED: f64 = 1e-10;
 const NEAR: f64 = 0.05;
 /// Within this share of the span a value is that of the pole itself.
 const AT: f64 = 1e-8;
-/// Normal part of the second derivative around the pole, as a share of its length, above which the
-/// pole is the tip of a cone and has no curvature.
+/// Normal part of the second derivative around the pole, as a share of its length or of the first
+/// derivative over the way around, above which the pole is the tip of a cone and has no curvature.
 const TIP: f64 = 1e-7;
 
 /// A side of the parameter rectangle.
@@ -158,6 +158,8 @@ struct PoleStrip {
     numerator: BsplineSurface,
     /// The weight as the first coordinate.
     weight: Option<BsplineSurface>,
+    /// Length of the domain of `along`.
+    around: f64,
     /// Whether `(along, t)` has the other orientation than `(u, v)`.
     turned: bool,
 }
@@ -208,7 +210,7 @@ impl PoleStrip {
                 Some(BsplineSurface::new(knots_u, bezier(degree)?, points, None)?)
             }
         };
-        Ok(Self { side, from, to, numerator, weight, turned })
+        Ok(Self { side, from, to, numerator, weight, around: along.1 - along.0, turned })
     }
 
     /// `(along, t)` of a parameter pair next to the pole.
@@ -235,7 +237,8 @@ impl PoleStrip {
         let l = if t > 0.0 {
             around.dot(normal) / t
         } else {
-            if around.dot(normal).abs() > TIP * around.length() {
+            let size = around.length().max(x.length() / self.around);
+            if around.dot(normal).abs() > TIP * size {
                 return Err(singular);
             }
             // The change of X × Y by t, of which the part along the normal does not count.
