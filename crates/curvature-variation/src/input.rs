@@ -61,7 +61,7 @@ const EVALUATIONS_PER_VERTEX: u64 = 40;
 /// Steps after which a run has mostly converged.
 const USUAL_STEPS: usize = 100;
 /// Floating-point operations of a microsecond.
-const FLOPS_PER_EVALUATION: u64 = 2000;
+const FLOPS_PER_EVALUATION: u64 = 8000;
 
 impl Input {
     /// What a run would take, roughly: in proportion to the vertices of the last level, and what

@@ -15,7 +15,7 @@ const MOST_PER_DIRECTION: usize = 2000;
 /// Memory of a sample with its derivatives and rows.
 const BYTES_PER_SAMPLE: f64 = 4000.0;
 /// Floating-point operations of a microsecond of one core.
-const FLOPS_PER_EVALUATION: f64 = 2000.0;
+const FLOPS_PER_EVALUATION: f64 = 4000.0;
 
 /// Which form of the same problem is solved.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
@@ -203,8 +203,8 @@ impl Options {
 }
 
 impl Options {
-    /// What a run on `surface` would take, roughly: the factor of the normal matrix, whose band is
-    /// as wide as the shorter side of the net, and the samples.
+    /// What a run on `surface` would take, roughly: the factor of the normal matrix, as a band along
+    /// the shorter side of the net or by nested dissection, and the samples.
     #[must_use]
     pub fn cost(&self, surface: &BsplineSurface) -> Cost {
         let own = [Counts { u: surface.n_u(), v: surface.n_v() }];
@@ -219,8 +219,12 @@ impl Options {
                 Some(samples) => samples.u as f64 * samples.v as f64,
                 None => 4.0 * long * short,
             };
-            let flops = unknowns * band * band + samples * (9 * order.pow(4)) as f64;
-            let bytes = 8.0 * unknowns * band + samples * BYTES_PER_SAMPLE;
+            // Of nested dissection: a separator is as long as the net is wide, and `order` rows thick.
+            let separator = 3.0 * order as f64 * (long * short).sqrt();
+            let factor = (unknowns * band * band).min(10.0 * separator.powi(3));
+            let fill = band.min(30.0 * order as f64 * (long * short).log2().max(1.0));
+            let flops = factor + samples * (9 * order.pow(4)) as f64;
+            let bytes = 8.0 * unknowns * fill + samples * BYTES_PER_SAMPLE;
             cost.bytes = cost.bytes.max(bytes as u64);
             let steps = self.iterations as f64;
             cost.evaluations =
