@@ -43,6 +43,9 @@ impl fmt::Display for Place {
 #[non_exhaustive]
 #[expect(missing_docs, reason = "the messages spell out every field")]
 pub enum Error {
+    /// No extent, too much of it, or too far away.
+    #[error(transparent)]
+    Size(#[from] geom_core::NormalizationError),
     /// NaN or infinity in the input.
     #[error("{place}: {what} is not finite; every coordinate and curvature must be a number")]
     NotFinite { place: Place, what: &'static str },

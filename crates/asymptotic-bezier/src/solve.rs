@@ -2,6 +2,7 @@
 
 use std::collections::BTreeMap;
 
+use geom_core::DVec3;
 use gp_solver::{Extra, Fingerprint, Observer, Problem, RunReport, Status, Variables};
 
 use crate::boundary::options::{BoundaryOptions, TorsionHandle};
@@ -17,6 +18,7 @@ use crate::lamella::strip::{Lamella, LamellaOptions, lamellas};
 use crate::metrics::Metrics;
 use crate::options::Options;
 use crate::patch::solve::{FilledPatch, patch_problem};
+use crate::place::Moved;
 use crate::relax::model::MovableNet;
 use crate::relax::relaxed::{RelaxOptions, Relaxed, relaxed_of, relaxed_patch_of};
 use crate::shell::gridshell::{
@@ -46,7 +48,8 @@ pub struct Solution {
     pub mean_jump_before: Option<f64>,
     /// What the relaxed mode did, when asked for.
     pub relaxed: Option<Relaxed>,
-    /// What the solver did: [`Status::Stalled`] if a relaxation found no acceptable data, else
+    /// What the solver did: [`Status::Partial`] or [`Status::Failed`] if patches cross themselves, by
+    /// [`Status::checked`]; [`Status::Stalled`] if a relaxation found no acceptable data, else
     /// [`Status::Converged`]; steps and stages are those of the least-squares solves, the others end
     /// at once.
     pub report: RunReport,
@@ -156,7 +159,7 @@ pub fn solve_with(
 /// # Errors
 /// As [`solve`]; [`Error::NoSuchStage`] for quartics and joins that have none.
 pub fn problem(input: &Input, options: &Options, phase: Phase) -> Result<Problem<'static>, Error> {
-    let prepared = Prepared::new(input, options)?;
+    let prepared = Prepared::new(input, -input.center()?, options)?;
     let (boundary, patch) = (&prepared.boundary, options.patch());
     let mut nobody = ();
     let watch = &mut Watch::quiet(&mut nobody);
@@ -203,9 +206,10 @@ struct Prepared {
 }
 
 impl Prepared {
-    fn new(input: &Input, options: &Options) -> Result<Self, Error> {
+    /// The data moved by a vector, and how their curves are to be solved.
+    fn new(input: &Input, by: DVec3, options: &Options) -> Result<Self, Error> {
         options.check()?;
-        let data = input.data.resolve()?;
+        let data = input.data.clone().moved(by).resolve()?;
         let mut wishes: BTreeMap<String, TorsionWish> = input.torsions.clone();
         for w in options.torsion.iter() {
             wishes.insert(w.corner.clone(), TorsionWish::Between(w.min, w.max));
@@ -229,10 +233,11 @@ fn run(
     extra: Option<&mut Extra<'_, Error>>,
     observer: &mut dyn Observer,
 ) -> Result<Solution, Error> {
-    let prepared = Prepared::new(input, options)?;
+    let center = input.center()?;
+    let prepared = Prepared::new(input, -center, options)?;
     let fingerprint = Fingerprint::new().text(&format!("{input:?} {options:?}")).finish();
     let stages = 2 + usize::from(options.relaxed);
-    let mut watch = Watch::new(observer, extra, fingerprint, stages)?;
+    let mut watch = Watch::new(observer, extra, fingerprint, stages, center)?;
     let filled = match &prepared.data {
         NetData::Patch(data) => fill_one(data, prepared.boundary, options, &mut watch)?,
         NetData::Net(net) => fill_all(net, prepared.boundary, options, &mut watch)?,
@@ -247,15 +252,17 @@ fn run(
     }
     let acceptable = relaxed.as_ref().is_none_or(|r| r.acceptable);
     let status = if acceptable { Status::Converged } else { Status::Stalled };
+    let crossing = check.patches.iter().filter(|patch| patch.self_intersections > 0).count();
+    let status = status.checked(crossing, check.patches.len());
     let (iterations, stages) = watch.into_reports();
     Ok(Solution {
         metrics: Metrics::new(&shell, &check),
-        result: shell,
-        net,
+        result: shell.moved(center),
+        net: net.moved(center),
         check,
         warnings,
         mean_jump_before,
-        relaxed,
+        relaxed: relaxed.map(|relaxed| relaxed.moved(center)),
         report: RunReport { status, iterations, stages },
     })
 }

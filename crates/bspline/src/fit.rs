@@ -33,6 +33,9 @@ pub enum FitError {
          near it; spread the parameters or ask for fewer control points"
     )]
     Undetermined { direction: &'static str, index: usize },
+    /// Points without extent, too large, too small or too far away.
+    #[error(transparent)]
+    Size(#[from] geom_core::NormalizationError),
     /// The result is not a spline (data that is not finite).
     #[error(transparent)]
     Spline(#[from] SplineError),

@@ -5,6 +5,7 @@
 //! are clamped to it, or wrapped where the direction is periodic.
 
 mod basis;
+mod check_grid;
 mod closest;
 mod conic;
 mod curve;
@@ -27,6 +28,7 @@ mod table;
 mod trim;
 
 pub use basis::{BasisValues, MAX_DERIVATIVE};
+pub use check_grid::{Flaw, FlawKind, LEAST_AREA_RATIO};
 pub use closest::SurfaceLocator;
 pub use conic::ArcSpans;
 pub use curve::BsplineCurve;

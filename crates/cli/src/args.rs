@@ -2,6 +2,7 @@
 //! whose feature is not there is an unknown flag.
 
 use crate::failure::Failure;
+use crate::outcome::Outcome;
 use std::num::NonZeroUsize;
 use std::path::{Path, PathBuf};
 
@@ -98,12 +99,23 @@ pub(crate) struct SystemArgs {
     pub(crate) dump_system: Option<PathBuf>,
 }
 
-/// `--require-converged`, for iterative commands.
+/// What is to become of results that are not as wished, for iterative commands.
 #[derive(Debug, clap::Args)]
-pub(crate) struct ConvergedArgs {
+pub(crate) struct EndingArgs {
     /// Exit with code 3 unless the status is `converged`
     #[arg(long)]
-    pub(crate) require_converged: bool,
+    require_converged: bool,
+    /// Write the model files of a result with the status `failed` too
+    #[arg(long)]
+    keep_failed: bool,
+}
+
+impl EndingArgs {
+    /// Tells the outcome.
+    pub(crate) fn apply(&self, outcome: &mut Outcome) {
+        outcome.require_converged = self.require_converged;
+        outcome.keep_failed = self.keep_failed;
+    }
 }
 
 /// Whether a file could be written at `path`: its folder is there and takes files.

@@ -11,6 +11,8 @@ pub(crate) const DEFECT: u8 = 1;
 pub(crate) const USAGE: u8 = 2;
 /// `--require-converged` and another status.
 pub(crate) const NOT_CONVERGED: u8 = 3;
+/// The result is no use where it was looked at more closely.
+pub(crate) const FAILED: u8 = 4;
 /// Ctrl-C.
 pub(crate) const INTERRUPTED: u8 = 130;
 

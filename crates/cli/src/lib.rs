@@ -20,7 +20,7 @@ mod watch;
 
 use clap::{CommandFactory, Parser};
 use context::Context;
-use failure::{DEFECT, Failure, INTERRUPTED, NOT_CONVERGED, OK, USAGE};
+use failure::{DEFECT, FAILED, Failure, INTERRUPTED, NOT_CONVERGED, OK, USAGE};
 use outcome::{Outcome, Status};
 use std::io::Write;
 use std::process::ExitCode;
@@ -105,6 +105,7 @@ fn exit_code(outcome: &Outcome) -> u8 {
     match outcome.status {
         Status::Interrupted => INTERRUPTED,
         Status::Converged => OK,
+        Status::Failed => FAILED,
         _ if outcome.require_converged => NOT_CONVERGED,
         _ => OK,
     }

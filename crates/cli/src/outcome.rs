@@ -17,6 +17,8 @@ pub(crate) struct Outcome {
     pub(crate) input: Option<PathBuf>,
     /// Result files with their bytes, `-o` outputs first.
     pub(crate) files: Vec<(PathBuf, Vec<u8>)>,
+    /// Report, figures and systems, which are written of a failed result too.
+    pub(crate) pages: Vec<(PathBuf, Vec<u8>)>,
     /// The checkpoint, the only file besides the metrics that an interrupted run writes.
     pub(crate) checkpoint: Option<(PathBuf, Vec<u8>)>,
     /// The `metrics` object, keys as documented.
@@ -27,6 +29,8 @@ pub(crate) struct Outcome {
     pub(crate) warnings: Vec<String>,
     /// Whether another status than `converged` exits with code 3.
     pub(crate) require_converged: bool,
+    /// Whether the files of a failed result are written.
+    pub(crate) keep_failed: bool,
 }
 
 impl Outcome {
@@ -37,11 +41,13 @@ impl Outcome {
             iterations,
             input: None,
             files: Vec::new(),
+            pages: Vec::new(),
             checkpoint: None,
             metrics: serde_json::json!({}),
             summary: Vec::new(),
             warnings: Vec::new(),
             require_converged: false,
+            keep_failed: false,
         }
     }
 
@@ -93,8 +99,13 @@ impl Outcome {
     }
 
     fn written(&self) -> impl Iterator<Item = &(PathBuf, Vec<u8>)> {
-        let results = if self.status == Status::Interrupted { &[][..] } else { &self.files };
-        results.iter().chain(&self.checkpoint)
+        let nothing: &[(PathBuf, Vec<u8>)] = &[];
+        let (files, pages) = match self.status {
+            Status::Interrupted => (nothing, nothing),
+            Status::Failed if !self.keep_failed => (nothing, &self.pages[..]),
+            _ => (&self.files[..], &self.pages[..]),
+        };
+        files.iter().chain(pages).chain(&self.checkpoint)
     }
 }
 

@@ -85,11 +85,11 @@ pub(crate) fn add_files(
     }
     report.run.insert("threads".to_owned(), context.threads.into());
     if let Some(path) = &args.report {
-        outcome.files.push((path.clone(), report.to_html().into_bytes()));
+        outcome.pages.push((path.clone(), report.to_html().into_bytes()));
     }
     if let Some(folder) = &args.figures {
         for figure in report.figures().map_err(Failure::other)? {
-            outcome.files.push((folder.join(figure.name), figure.bytes));
+            outcome.pages.push((folder.join(figure.name), figure.bytes));
         }
     }
     Ok(())

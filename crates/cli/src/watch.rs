@@ -61,7 +61,7 @@ impl<'c> Watch<'c> {
 
     /// Hands the last checkpoint and the systems to the outcome.
     pub(crate) fn finish(self, outcome: &mut Outcome) -> Result<(), Failure> {
-        outcome.files.extend(self.systems);
+        outcome.pages.extend(self.systems);
         if let (Some(path), Some(state)) = (self.keep, self.state) {
             let bytes = serde_json::to_vec(&state).map_err(Failure::other)?;
             outcome.checkpoint = Some((path, bytes));

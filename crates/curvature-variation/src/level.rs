@@ -25,6 +25,8 @@ use crate::variables::{control_points, fixed_vertices};
 
 /// How many times the initial energy below zero an energy counts as having no minimum.
 const UNBOUNDED: f64 = 1e6;
+/// An energy below this share of the start's has vanished.
+const VANISHED: f64 = 1e-12;
 
 /// What a level was made of, beside what its [`StageReport`] says.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -183,6 +185,14 @@ pub(crate) fn solve_level(
             }
             other => other?,
         }
+        let is_last = begin.stage.number + 1 == begin.stage.count;
+        if is_last && state.report.status == Status::Converged {
+            level.with_metric(|of| {
+                MetricAssembly::new(&surface, &evaluator, &freedom, &of.pulls, of.extra.as_ref())
+            })?;
+            state.report.status =
+                certified(&mut level, &state, initial_energy, tolerance, &mut watch)?;
+        }
         state.report.clone()
     };
     let y = &mut state.y;
@@ -203,6 +213,29 @@ pub(crate) fn solve_level(
     (report.initial_energy, report.final_energy) = (initial_energy, final_energy);
     report.timings.total = clock.elapsed();
     Ok(Some((StageReport { stage: begin.stage.clone(), solver: report }, numbers)))
+}
+
+/// Whether a level that has stopped gaining stands at a minimum: `Converged` only if a Gauss-Newton
+/// step, whatever the method was, foresees no more than `tolerance` of the energy as gain either.
+/// Energies that have all but vanished have nothing to gain.
+fn certified(
+    level: &mut Conditioned<'_>,
+    state: &State,
+    initial_energy: f64,
+    tolerance: f64,
+    observer: &mut dyn Observer,
+) -> Result<Status, SolverError> {
+    let energy = level.energy.energy(&state.y).abs();
+    if energy <= VANISHED * initial_energy.abs() {
+        return Ok(Status::Converged);
+    }
+    let gain = level.foreseen_gain(&state.y, observer)?;
+    Ok(match gain {
+        Some(gain) if gain <= tolerance * energy => Status::Converged,
+        Some(_) => Status::Stalled,
+        // Stopped while it was looked at: the result stands, its status is not proven.
+        None => Status::Interrupted,
+    })
 }
 
 /// Lets the caller add to the level's problem.

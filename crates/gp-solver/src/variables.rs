@@ -27,6 +27,7 @@ pub struct Variables {
     scale: Vec<f64>,
     order: Option<Vec<usize>>,
     run: Option<usize>,
+    vectors: Vec<Group>,
 }
 
 /// Where the unknowns of one group stand: `items` of `width` components each.
@@ -241,6 +242,20 @@ impl Variables {
         assert!(size > 0.0 && size.is_finite(), "a natural size is positive and finite");
         self.scale[range].fill(size);
         self
+    }
+
+    /// Says that the items of a group are points or vectors in space, whose components mean nothing
+    /// each by itself: they are damped alike, by the mean of their diagonal, so that a turned problem
+    /// takes turned steps.
+    pub fn set_vectors(&mut self, group: Group) -> &mut Self {
+        self.vectors.push(group);
+        self
+    }
+
+    /// The groups whose items are points or vectors.
+    #[must_use]
+    pub fn vectors(&self) -> &[Group] {
+        &self.vectors
     }
 
     /// The natural size of each unknown.

@@ -28,6 +28,9 @@ pub enum PatchError {
 #[non_exhaustive]
 #[expect(missing_docs, reason = "the messages spell out every field")]
 pub enum Error {
+    /// No extent, too much of it, or too far away.
+    #[error(transparent)]
+    Size(#[from] geom_core::NormalizationError),
     /// A face that is not a quad.
     #[error(
         "face {face} has {corners} corners; a net needs quads along the asymptotic directions: remesh the surface to such quads first"

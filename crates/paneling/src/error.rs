@@ -5,6 +5,9 @@
 #[non_exhaustive]
 #[expect(missing_docs, reason = "the messages spell out every field")]
 pub enum Error {
+    /// No extent, too much of it, or too far away.
+    #[error(transparent)]
+    Size(#[from] geom_core::NormalizationError),
     /// A layout with no panels in one direction.
     #[error("a layout of {u} x {v} panels has none; ask for at least 1 x 1")]
     NoPanels { u: usize, v: usize },

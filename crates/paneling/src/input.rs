@@ -6,6 +6,7 @@ use crate::layout::tiling::Layout;
 use crate::mold::prices::PriceList;
 use crate::options::{Options, PANELS};
 use bspline::BsplineSurface;
+use geom_core::{DVec3, Normalization};
 use gp_solver::Counts;
 
 /// What is to be panelled: a surface, or panels that are cut already; and what molds and panels
@@ -68,10 +69,20 @@ impl<'a> Input<'a> {
     /// The panels, cut as the options say.
     ///
     /// # Errors
-    /// [`Error`] of the layout, [`Error::Singular`] where the surface has no normal.
+    /// [`Error`] of the layout, [`Error::Singular`] where the surface has no normal, [`Error::Size`]
+    /// for one without extent.
     pub fn panels(&self, options: &Options) -> Result<PanelSet, Error> {
+        let (centred, center) = self.centred(options)?;
+        Ok(centred.translated(center))
+    }
+
+    /// The panels moved to the origin, and by what they have been moved away from.
+    pub(crate) fn centred(&self, options: &Options) -> Result<(PanelSet, DVec3), Error> {
         let (surface, layout) = match self.cut {
-            Cut::Panels(panels) => return Ok(panels.clone()),
+            Cut::Panels(panels) => {
+                let center = Normalization::of(&panels.samples.points)?.center();
+                return Ok((panels.clone().translated(-center), center));
+            }
             Cut::Surface(surface, layout) => (surface, layout),
         };
         let layout = match layout {
@@ -85,6 +96,6 @@ impl<'a> Input<'a> {
         };
         let layout =
             if options.equal_arc_length { layout.with_equal_arc_length(surface) } else { layout };
-        PanelSet::new(surface, &layout)
+        PanelSet::centred(surface, &layout)
     }
 }

@@ -5,6 +5,7 @@ use crate::mold::prices::PriceList;
 use crate::mold::shape::Mold;
 use crate::seam::measure::{Measures, measure};
 use crate::search::attempt::Found;
+use geom_core::DVec3;
 
 /// Panels on their molds; lengths in model units.
 #[derive(Clone, Debug, PartialEq)]
@@ -36,6 +37,12 @@ impl Paneling {
             .collect();
         let measures = measure(set, &molds, &fit.labels, &poses);
         Self { molds, labels: fit.labels, poses, measures, fit_history, seam_history }
+    }
+
+    /// The same panels somewhere else.
+    pub(crate) fn translated(mut self, by: DVec3) -> Self {
+        self.poses.iter_mut().for_each(|pose| pose.origin += by);
+        self
     }
 
     /// Total cost of molds and panels.

@@ -115,7 +115,7 @@ pub fn problem<'a>(
     options: &Options,
 ) -> Result<(Problem<'static>, Vec<f64>), Error> {
     let input = input.into();
-    let panels = input.panels(options)?;
+    let (panels, _) = input.centred(options)?;
     let site = Site::new(&panels, &input.prices, options)?;
     let mut nobody = ();
     let pulse = Pulse::new(&mut nobody);
@@ -136,7 +136,7 @@ fn run(
     observer: &mut dyn Observer,
 ) -> Result<Solution, Error> {
     options.check()?;
-    let panels = input.panels(options)?;
+    let (panels, center) = input.centred(options)?;
     let site = Site::new(&panels, &input.prices, options)?;
     let pulse = Pulse::new(observer);
     let (fits, found, grid, is_done) = match Course::new(&site, &pulse)? {
@@ -165,6 +165,9 @@ fn run(
         worst_excess,
         grid: of_grid.map(|grid| Quality::new(&panels, grid)),
     };
+    // Measured where rounding is small, then moved to where the design stands.
+    let back = |paneling: Paneling| paneling.translated(center);
+    let (result, grid, panels) = (back(result), grid.map(back), panels.translated(center));
     Ok(Solution { result, panels, metrics, grid, report, fits })
 }
 

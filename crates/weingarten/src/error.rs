@@ -1,6 +1,7 @@
 //! Why an optimisation cannot be attempted.
 
 use bspline::{FitError, KnotError, SplineError};
+use geom_core::NormalizationError;
 use gp_solver::SolverError;
 
 /// What makes it impossible to attempt an optimisation. Not converging is a status, not an error.
@@ -14,9 +15,9 @@ pub enum Error {
          cut the pole off or spread the control points that coincide"
     )]
     Singular { u: f64, v: f64 },
-    /// All control points in one place.
-    #[error("all control points coincide, so the surface has no extent; check the coordinates")]
-    NoExtent,
+    /// No extent, too much of it, or too far away.
+    #[error(transparent)]
+    Size(#[from] NormalizationError),
     /// Not enough samples to see the surface.
     #[error("{found} samples in {direction} are too few; ask for at least {needed}")]
     TooFewSamples { direction: &'static str, found: usize, needed: usize },

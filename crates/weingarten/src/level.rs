@@ -39,7 +39,7 @@ impl Level {
     ) -> Result<Self, Error> {
         let grid = Arc::new(SampleGrid::uniform(&reference, sample_counts(&reference, samples)));
         let samples = regular_samples(&grid, &coordinates(&reference))?;
-        let curvature = curvature_size(&reference, &samples)?.unwrap_or(1.0);
+        let curvature = curvature_size(&reference, &samples).unwrap_or(1.0);
         Ok(Self { reference, grid, curvature, stage })
     }
 

@@ -25,12 +25,20 @@ pub struct Metrics {
     /// curvature diagram sweeps in units of its box. 0 where `H` or `K` is constant to 1e-9 of
     /// its size.
     pub diagram_area: f64,
-    /// Mean same-parameter distance to the input, in percent of its bounding-box diagonal.
+    /// Mean same-parameter distance to the input, in percent of its size: the diameter of the
+    /// smallest ball around its [check grid](BsplineSurface::check_parameters).
     pub deviation_mean_percent: f64,
     /// Largest same-parameter distance to the input, likewise.
     pub deviation_max_percent: f64,
     /// Largest same-parameter distance along the border, likewise; 0 for a surface without one.
     pub boundary_deviation_max_percent: f64,
+    /// [`deviation_mean_percent`](Self::deviation_mean_percent) of the diagonal of the box of the
+    /// control points, as releases before gave it.
+    pub deviation_mean_percent_box: f64,
+    /// [`deviation_max_percent`](Self::deviation_max_percent), likewise.
+    pub deviation_max_percent_box: f64,
+    /// [`boundary_deviation_max_percent`](Self::boundary_deviation_max_percent), likewise.
+    pub boundary_deviation_max_percent_box: f64,
     /// Least mean curvature.
     pub mean_curvature_min: f64,
     /// Largest mean curvature.
@@ -47,6 +55,9 @@ pub struct Metrics {
 /// Measures surfaces against the input they come from.
 pub(crate) struct Meter<'a> {
     input: &'a BsplineSurface,
+    /// Size of the input, and the diagonal of the box of its control points.
+    size: f64,
+    diagonal: f64,
     samples: [usize; 2],
     unit: f64,
 }
@@ -55,9 +66,16 @@ pub(crate) struct Meter<'a> {
 pub(crate) type ScaledTarget<'t> = Option<&'t Target>;
 
 impl<'a> Meter<'a> {
-    /// `samples` are those of the optimiser, `unit` its working scale.
-    pub(crate) fn new(input: &'a BsplineSurface, samples: [usize; 2], unit: f64) -> Self {
-        Self { input, samples, unit }
+    /// `size` is that of the input, `samples` are those of the optimiser, `unit` its working scale.
+    pub(crate) fn new(
+        input: &'a BsplineSurface,
+        size: f64,
+        samples: [usize; 2],
+        unit: f64,
+    ) -> Self {
+        let diagonal = BoundingBox::of(input.control_points().iter().copied())
+            .map_or(1.0, BoundingBox::diagonal);
+        Self { input, size, diagonal, samples, unit }
     }
 
     /// The metrics of `surface`.
@@ -65,22 +83,26 @@ impl<'a> Meter<'a> {
         let fine = self.samples.map(|m| 2 * m);
         let grid = SampleGrid::midpoints(surface, fine);
         let here = samples(&grid, &coordinates(surface));
-        let diagonal = BoundingBox::of(self.input.control_points().iter().copied())
-            .map_or(1.0, BoundingBox::diagonal);
         let (mean, max) = deviation(self.input, &grid, &here);
+        let border = self.border_deviation(surface, fine);
+        let of_size = |length: f64| 100.0 * length / self.size;
+        let of_box = |length: f64| 100.0 * length / self.diagonal;
         let range = |f: fn(&Sample) -> f64| {
             here.iter()
                 .map(f)
                 .fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), x| (l.min(x), h.max(x)))
         };
         let (h, k) = (range(|s| s.jet.h), range(|s| s.jet.k));
-        let (alignment_rms, diagram_area) = self.alignment(surface, &here, diagonal, h, k);
+        let (alignment_rms, diagram_area) = self.alignment(surface, &here, h, k);
         Metrics {
             alignment_rms,
             diagram_area,
-            deviation_mean_percent: 100.0 * mean / diagonal,
-            deviation_max_percent: 100.0 * max / diagonal,
-            boundary_deviation_max_percent: 100.0 * self.border_deviation(surface, fine) / diagonal,
+            deviation_mean_percent: of_size(mean),
+            deviation_max_percent: of_size(max),
+            boundary_deviation_max_percent: of_size(border),
+            deviation_mean_percent_box: of_box(mean),
+            deviation_max_percent_box: of_box(max),
+            boundary_deviation_max_percent_box: of_box(border),
             mean_curvature_min: h.0,
             mean_curvature_max: h.1,
             gaussian_curvature_min: k.0,
@@ -99,13 +121,12 @@ impl<'a> Meter<'a> {
         &self,
         surface: &BsplineSurface,
         here: &[Sample],
-        diagonal: f64,
         h: (f64, f64),
         k: (f64, f64),
     ) -> (f64, f64) {
         // The size of the curvatures; where nothing is curved, rounding counts for nothing.
         let largest = |s: &Sample| s.principal().0.abs().max(s.principal().1.abs());
-        let size = here.iter().map(largest).fold(CONSTANT_RATIO / diagonal, f64::max);
+        let size = here.iter().map(largest).fold(CONSTANT_RATIO / self.size, f64::max);
         let (range_h, range_k) = (h.1 - h.0, k.1 - k.0);
         if range_h <= CONSTANT_RATIO * size || range_k <= CONSTANT_RATIO * size * size {
             return (0.0, 0.0);

@@ -2,7 +2,7 @@
 
 use std::ops::ControlFlow;
 
-use bspline::BsplineSurface;
+use bspline::{BsplineSurface, Flaw};
 use gp_solver::{
     Checkpoint, Extra, Fingerprint, Observer, Problem, Progress, Run, RunReport, Stage,
     StageReport, Status, System,
@@ -18,6 +18,8 @@ use crate::sampled::SampledSurface;
 use crate::schedule::Schedule;
 use crate::variables::{coordinates, scaled};
 
+/// Over how many last steps it is told what they changed.
+const LAST_STEPS: usize = 10;
 /// The name of the method in checkpoints.
 const METHOD: &str = "weingarten";
 
@@ -37,6 +39,12 @@ pub struct Solution {
     pub report: RunReport,
     /// Samples in u and v of the last level.
     pub samples: [usize; 2],
+    /// Where the result is torn or folded between the samples, checked on a grid ten times as dense;
+    /// the status of the report is [`Status::Failed`] then.
+    pub flaws: Vec<Flaw>,
+    /// How many steps before the end, ten at most, and what the metrics were there; none where the
+    /// run ended otherwise than by the number of steps.
+    pub earlier: Option<(usize, Metrics)>,
 }
 
 /// Optimises `surface` towards a Weingarten surface near to it.
@@ -97,7 +105,9 @@ pub fn solve_with(
     extra: &mut Extra<'_, Error>,
     observer: &mut dyn Observer,
 ) -> Result<Solution, Error> {
-    let schedule = Schedule::new(surface, options)?;
+    let place = surface.normalization()?;
+    let centred = surface.translated(-place.center());
+    let schedule = Schedule::new(&centred, &place, options)?;
     let fingerprint = fingerprint(surface, options);
     let resume = observer.resume();
     if let Some(checkpoint) = &resume {
@@ -106,6 +116,7 @@ pub fn solve_with(
     let first = resume.as_ref().map_or(0, |c| c.stage);
     let mut stages: Vec<StageReport> = Vec::new();
     let mut done: Option<(Level, SampledSurface, BsplineSurface)> = None;
+    let mut earlier: Option<(usize, Vec<f64>)> = None;
     for number in first..schedule.len() {
         let level = schedule.level(number)?;
         let resumed = resume.as_ref().filter(|c| c.stage == number);
@@ -120,8 +131,10 @@ pub fn solve_with(
         if let Some(checkpoint) = resumed {
             run.resume(checkpoint)?;
         }
-        let mut watch = Watch { observer, stage: &level.stage, start: &origin, fingerprint };
+        let mut watch =
+            Watch { observer, stage: &level.stage, start: &origin, fingerprint, earlier: None };
         let status = run.go_on(&level.stage, &mut watch)?;
+        earlier = watch.earlier.filter(|_| status == Status::IterationLimit);
         let working = level.surface(&run.x()[..level.unknowns()])?;
         stages.push(StageReport { stage: level.stage.clone(), solver: run.report(status) });
         let start = level.sampled(&origin)?;
@@ -134,7 +147,16 @@ pub fn solve_with(
         let what = "a run with more levels".to_owned();
         return Err(gp_solver::SolverError::ForeignCheckpoint { what }.into());
     };
-    finish(surface, options, &level, &start, &working, stages)
+    // A net nothing has moved is the input itself, to the last bit.
+    let is_input = stages.iter().all(|s| s.solver.iterations == 0)
+        && options.levels.is_empty()
+        && options.moves.is_empty();
+    let working = if is_input { None } else { Some(&working) };
+    let finished =
+        finish(&centred, place.size(), options, &level, &start, working, earlier, stages)?;
+    let result =
+        if is_input { surface.clone() } else { finished.result.translated(place.center()) };
+    Ok(Solution { result, ..finished })
 }
 
 /// The problem of the first level, at its start.
@@ -142,34 +164,52 @@ pub fn solve_with(
 /// # Errors
 /// As [`solve`].
 pub fn problem(surface: &BsplineSurface, options: &Options) -> Result<Problem<'static>, Error> {
-    let level = Schedule::new(surface, options)?.level(0)?;
+    let place = surface.normalization()?;
+    let level = Schedule::new(&surface.translated(-place.center()), &place, options)?.level(0)?;
     let origin = coordinates(&level.reference);
     Ok(prepared(&level, options, &origin, &mut |_, _, _| Ok(()))?.problem)
 }
 
-/// Back to the model's units, measured and put together.
+/// Back to the model's units, but still centred, measured and put together. Curvatures are measured
+/// here because far from the origin rounding would eat their derivatives.
 fn finish(
     input: &BsplineSurface,
+    size: f64,
     options: &Options,
     level: &Level,
     start: &SampledSurface,
-    working: &BsplineSurface,
+    working: Option<&BsplineSurface>,
+    earlier: Option<(usize, Vec<f64>)>,
     stages: Vec<StageReport>,
 ) -> Result<Solution, Error> {
-    let report = RunReport::of_stages(stages);
-    // A net nothing has moved is the input itself, to the last bit.
-    let is_input = report.iterations == 0 && options.levels.is_empty() && options.moves.is_empty();
-    let result = if is_input { input.clone() } else { scaled(working, 1.0 / level.stage.unit)? };
+    let mut report = RunReport::of_stages(stages);
+    let result = match working {
+        Some(working) => scaled(working, 1.0 / level.stage.unit)?,
+        None => input.clone(),
+    };
     let target = level.target(options, start);
     let samples = [level.grid.u.len(), level.grid.v.len()];
-    let meter = Meter::new(input, samples, level.stage.unit);
+    let flaws = if report.iterations > 0 { result.flaws_against(input) } else { Vec::new() };
+    if !flaws.is_empty() && report.status != Status::Interrupted {
+        report.status = Status::Failed;
+    }
+    let meter = Meter::new(input, size, samples, level.stage.unit);
+    let earlier = match earlier {
+        Some((steps, x)) => {
+            let surface = scaled(&level.surface(&x)?, 1.0 / level.stage.unit)?;
+            Some((steps, meter.measure(&surface, target.as_ref())))
+        }
+        None => None,
+    };
     Ok(Solution {
         before: meter.measure(input, target.as_ref()),
         metrics: meter.measure(&result, target.as_ref()),
         relation: target.as_ref().map(|target| meter.locus(&result, target)),
         report,
+        earlier,
         result,
         samples,
+        flaws,
     })
 }
 
@@ -193,12 +233,18 @@ struct Watch<'o> {
     stage: &'o Stage,
     start: &'o [f64],
     fingerprint: u64,
+    /// The control points some steps before the last one allowed, and how many.
+    earlier: Option<(usize, Vec<f64>)>,
 }
 
 impl Observer for Watch<'_> {
     fn step(&mut self, progress: &Progress<'_>) -> ControlFlow<()> {
         // Control points only: auxiliary variables of the lifted formulation stay behind.
         let x = &progress.x[..self.start.len()];
+        let left = progress.max_iterations.saturating_sub(progress.iteration);
+        if left > 0 && (self.earlier.is_none() || left >= LAST_STEPS) {
+            self.earlier = Some((left, x.to_vec()));
+        }
         self.observer.step(&Progress { x, ..*progress })
     }
 

@@ -63,7 +63,7 @@ fn metrics_of_recorded_nets_equal_the_recorded_ones() {
     for scene in fixtures::reference::scenes() {
         let surface = scene.surface();
         let samples = [scene.samples.0, scene.samples.1];
-        let metrics = Meter::new(&surface, samples, 1.0).measure(&surface, None);
+        let metrics = Meter::new(&surface, 1.0, samples, 1.0).measure(&surface, None);
         assert_close(metrics.alignment_rms / scene.metrics_start.sin, 1.0, 1e-9);
         assert_close(metrics.diagram_area / scene.metrics_start.area, 1.0, 1e-9);
         assert_close(metrics.deviation_max_percent, 0.0, 1e-12);

@@ -309,7 +309,7 @@ fn what_cannot_be_attempted_is_refused_with_a_sentence() {
         solve(surface, options, &mut ()).expect_err("an error").to_string()
     };
     let nothing = mapped(&roof, |_| DVec3::ONE);
-    assert!(message(&nothing, &few(1)).contains("no extent"));
+    assert!(message(&nothing, &few(1)).contains("equal ("));
     // A pole: the first row of the net in one point.
     let points = roof.control_points().iter().enumerate();
     let pinched = points.map(|(k, p)| if k < 8 { DVec3::ZERO } else { *p }).collect();

@@ -1,6 +1,6 @@
 //! `umbilic darboux NET -o OUT`.
 
-use crate::args::{ConfigArgs, ConvergedArgs, OutputArgs, ReportArgs};
+use crate::args::{ConfigArgs, EndingArgs, OutputArgs, ReportArgs};
 use crate::context::Context;
 use crate::failure::Failure;
 use crate::net_files::{self, NetInput};
@@ -37,7 +37,7 @@ pub(crate) struct Darboux {
     #[command(flatten)]
     report: ReportArgs,
     #[command(flatten)]
-    converged: ConvergedArgs,
+    ending: EndingArgs,
 }
 
 /// The cage file.
@@ -70,7 +70,7 @@ impl Darboux {
         let (metrics, sampled, corners) = (&image.metrics, &image.result, &image.corners);
         let mut outcome =
             Outcome::new(status, steps).with_input(&self.input).with_metrics(metrics)?;
-        outcome.require_converged = self.converged.require_converged;
+        self.ending.apply(&mut outcome);
         for path in self.output.output {
             let mesh = net_files::sampled_mesh("Darboux transform", sampled);
             let model = Model::of_mesh(mesh, unit.clone());

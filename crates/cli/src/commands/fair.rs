@@ -1,6 +1,6 @@
 //! `umbilic fair QUADS -o OUT`.
 
-use crate::args::{CheckpointArgs, ConfigArgs, ConvergedArgs, OutputArgs, ReportArgs};
+use crate::args::{CheckpointArgs, ConfigArgs, EndingArgs, OutputArgs, ReportArgs};
 use crate::context::Context;
 use crate::failure::Failure;
 use crate::option_flags::{OptionFlags, list, refused};
@@ -41,7 +41,7 @@ pub(crate) struct Fair {
     #[command(flatten)]
     checkpoint: CheckpointArgs,
     #[command(flatten)]
-    converged: ConvergedArgs,
+    ending: EndingArgs,
     #[command(flatten)]
     report: ReportArgs,
 }
@@ -99,7 +99,7 @@ impl Fair {
         let warnings = fitted.iter().chain(&result.warnings);
         outcome.warnings.extend(warnings.map(ToString::to_string));
         outcome.summary.extend(splines.as_ref().map(spline_summary));
-        outcome.require_converged = self.converged.require_converged;
+        self.ending.apply(&mut outcome);
         for path in self.output.output {
             let content = content_for(&path, &result, splines.as_ref(), &model.unit);
             let bytes =

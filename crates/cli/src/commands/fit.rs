@@ -38,7 +38,7 @@ gp_solver::options! {
         ctrl: Option<Counts> = None;
         /// Degree in both directions, 1 to 15; 4 if not given.
         degree: Option<usize> = None;
-        /// Largest distance of a point to the surface; 0.1 % of the diagonal if not given.
+        /// Largest distance of a point to the surface; 0.1 % of the size if not given.
         tolerance: Option<f64> = None;
     }
 }
@@ -78,7 +78,7 @@ impl Fit {
                 data.n_v
             ),
             format!(
-                "  distance mean {:.3e}, rms {:.3e}, max {:.3e} {unit} ({:.4} % of the diagonal)",
+                "  distance mean {:.3e}, rms {:.3e}, max {:.3e} {unit} ({:.4} % of the size)",
                 fit.distance_mean, fit.distance_rms, fit.distance_max, metrics.distance_max_percent
             ),
         ];
@@ -153,6 +153,8 @@ struct FitMetrics {
     distance_rms: f64,
     distance_max: f64,
     distance_max_percent: f64,
+    /// Of the diagonal of the box of the points, as releases before gave it.
+    distance_max_percent_box: f64,
 }
 
 impl FitMetrics {
@@ -169,7 +171,8 @@ impl FitMetrics {
             distance_mean: fit.distance_mean,
             distance_rms: fit.distance_rms,
             distance_max: fit.distance_max,
-            distance_max_percent: 100.0 * fit.distance_max / diagonal,
+            distance_max_percent: 100.0 * fit.distance_max / fit.size,
+            distance_max_percent_box: 100.0 * fit.distance_max / diagonal,
         }
     }
 }

@@ -1,6 +1,6 @@
 //! `umbilic hnet QUADS -o OUT`.
 
-use crate::args::{CheckpointArgs, ConfigArgs, ConvergedArgs, OutputArgs, ReportArgs, SystemArgs};
+use crate::args::{CheckpointArgs, ConfigArgs, EndingArgs, OutputArgs, ReportArgs, SystemArgs};
 use crate::context::Context;
 use crate::failure::Failure;
 use crate::net_files::{self, NetInput};
@@ -35,7 +35,7 @@ pub(crate) struct Hnet {
     #[command(flatten)]
     report: ReportArgs,
     #[command(flatten)]
-    converged: ConvergedArgs,
+    ending: EndingArgs,
     #[command(flatten)]
     system: SystemArgs,
 }
@@ -76,7 +76,7 @@ impl Hnet {
         }
         outcome.summary = summary(&solution);
         outcome.warnings = warnings;
-        outcome.require_converged = self.converged.require_converged;
+        self.ending.apply(&mut outcome);
         if self.report.wanted() {
             let mut page = net_report::page("Hyperbolic net", &self.input, &unit);
             option_flags::list(&mut page, &options, &[]);

@@ -1,6 +1,6 @@
 //! `umbilic panel SURFACE -o OUT`.
 
-use crate::args::{CheckpointArgs, ConfigArgs, ConvergedArgs, ReportArgs, check_output_path};
+use crate::args::{CheckpointArgs, ConfigArgs, EndingArgs, ReportArgs, check_output_path};
 use crate::context::Context;
 use crate::failure::Failure;
 use crate::option_flags::{OptionFlags, list, refused};
@@ -37,7 +37,7 @@ pub(crate) struct Panel {
     #[command(flatten)]
     checkpoint: CheckpointArgs,
     #[command(flatten)]
-    converged: ConvergedArgs,
+    ending: EndingArgs,
     #[command(flatten)]
     report: ReportArgs,
 }
@@ -100,7 +100,7 @@ impl Panel {
             .with_metrics(&solution.metrics)?;
         watch.finish(&mut outcome)?;
         outcome.warnings = model.warnings;
-        outcome.require_converged = self.converged.require_converged;
+        self.ending.apply(&mut outcome);
         outcome.summary = summary(&solution, &unit);
         for path in self.output {
             let sheet = options.sheet.map(|s| [s.width, s.height]);
@@ -169,7 +169,7 @@ fn summary(solution: &Solution, unit: &LengthUnit) -> Vec<String> {
             "  gaps: median {:.3e}, 95 % below {:.3e}, largest {:.3e} {unit}",
             quality.gap_median, quality.gap_p95, quality.gap_max
         ),
-        format!("  design met within {:.5} % of the diagonal", quality.deviation_max_percent),
+        format!("  design met within {:.5} % of the size", quality.deviation_max_percent),
     ];
     let counts = MoldType::ALL.map(|t| (t, paneling.molds.iter().filter(|m| m.kind == t).count()));
     let used: Vec<String> = counts

@@ -1,14 +1,15 @@
 //! `umbilic weingarten SURFACE -o OUT`.
 
-use crate::args::{CheckpointArgs, ConfigArgs, ConvergedArgs, OutputArgs, ReportArgs, SystemArgs};
+use crate::args::{CheckpointArgs, ConfigArgs, EndingArgs, OutputArgs, ReportArgs, SystemArgs};
 use crate::context::Context;
 use crate::failure::Failure;
 use crate::option_flags::{OptionFlags, refused};
-use crate::outcome::Outcome;
+use crate::outcome::{Outcome, Status};
 use crate::report_support;
 use crate::report_support::weingarten::weingarten_report;
 use crate::surface_file::read_surface;
 use crate::watch::Watch;
+use bspline::{Flaw, FlawKind};
 use exchange::{LengthUnit, Model};
 use serde::Serialize;
 use std::path::PathBuf;
@@ -34,7 +35,7 @@ pub(crate) struct Weingarten {
     #[command(flatten)]
     checkpoint: CheckpointArgs,
     #[command(flatten)]
-    converged: ConvergedArgs,
+    ending: EndingArgs,
     #[command(flatten)]
     report: ReportArgs,
     #[command(flatten)]
@@ -54,8 +55,8 @@ impl Weingarten {
             .map_err(|e| refused::<Options>(&self.input, e))?;
         let mut outcome = outcome(&solution, &model.unit)?.with_input(&self.input);
         watch.finish(&mut outcome)?;
-        outcome.warnings = model.warnings;
-        outcome.require_converged = self.converged.require_converged;
+        outcome.warnings.extend(model.warnings);
+        self.ending.apply(&mut outcome);
         let report = match self.report.wanted() {
             true => {
                 let unit = model.unit.to_string();
@@ -84,10 +85,13 @@ pub(crate) fn outcome(solution: &Solution, unit: &LengthUnit) -> Result<Outcome,
         variables: report.variables(),
         control_points: solution.result.control_points().len(),
         samples: solution.samples[0] * solution.samples[1],
+        flaws: solution.flaws.len(),
+        flaws_at: solution.flaws.iter().map(|f| (f.kind.as_str(), f.u, f.v)).collect(),
         ms_per_iteration: report.ms_per_iteration(),
         factorizations: report.factorizations(),
     })?;
     outcome.summary = summary(solution, unit);
+    outcome.warnings.extend(flaw_warning(&solution.flaws));
     Ok(outcome)
 }
 
@@ -99,8 +103,40 @@ struct Numbers<'a> {
     variables: usize,
     control_points: usize,
     samples: usize,
+    /// Check points where the result folds, has a spike or is not finite, and where.
+    flaws: usize,
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    flaws_at: Vec<(&'static str, f64, f64)>,
     ms_per_iteration: f64,
     factorizations: usize,
+}
+
+/// How the run ended, in words. Steps that were asked for and made are no cause for alarm.
+fn ending(solution: &Solution) -> String {
+    let (after, status) = (&solution.metrics, solution.report.status);
+    match (&solution.earlier, status) {
+        (Some((steps, earlier)), Status::IterationLimit) if earlier.diagram_area > 0.0 => {
+            let change = 100.0 * (after.diagram_area / earlier.diagram_area - 1.0);
+            format!("as asked for; the last {steps} changed the diagram by {change:.1} %")
+        }
+        _ => status.as_str().replace('_', " "),
+    }
+}
+
+/// What is wrong with the result, and what to do about it.
+fn flaw_warning(flaws: &[Flaw]) -> Option<String> {
+    let first = flaws.first()?;
+    let what = match first.kind {
+        FlawKind::Fold => "folds back on itself",
+        FlawKind::NotFinite => "is not finite",
+        _ => "has a spike or a tear",
+    };
+    Some(format!(
+        "the result {what} between its samples, first at u = {:.6}, v = {:.6} ({} places in all); ask for more samples, a larger fairness or closeness, or fewer steps, or look at it with --keep-failed",
+        first.u,
+        first.v,
+        flaws.len()
+    ))
 }
 
 fn summary(solution: &Solution, unit: &LengthUnit) -> Vec<String> {
@@ -110,7 +146,7 @@ fn summary(solution: &Solution, unit: &LengthUnit) -> Vec<String> {
         surface.n_u(),
         surface.n_v(),
         report.iterations,
-        report.status.as_str().replace('_', " "),
+        ending(solution),
     )];
     lines.push(format!(
         "  curvature diagram    {:.6} of its box (before {:.6})",
@@ -127,7 +163,7 @@ fn summary(solution: &Solution, unit: &LengthUnit) -> Vec<String> {
         ));
     }
     lines.push(format!(
-        "  deviation            mean {:.4} %, max {:.4} %, border {:.4} % of the diagonal",
+        "  deviation            mean {:.4} %, max {:.4} %, border {:.4} % of the size",
         after.deviation_mean_percent,
         after.deviation_max_percent,
         after.boundary_deviation_max_percent

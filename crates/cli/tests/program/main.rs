@@ -13,6 +13,7 @@ mod fair;
 mod hyperbolic;
 #[cfg(unix)]
 mod interruptions;
+mod invariance;
 mod panel;
 mod report;
 mod weingarten;

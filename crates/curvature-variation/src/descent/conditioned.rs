@@ -7,9 +7,13 @@ use crate::functional::ROOT_EPSILON;
 use crate::limits::LinearRow;
 use crate::metric::MetricAssembly;
 use gp_solver::{Metric, Observer, SolverError, Status};
+use numerics::dot;
 
 /// How often a matrix that is not positive definite is given more of the Sobolev norm.
 const MENDINGS: usize = 12;
+
+/// Weight of the Sobolev norm where nothing is to be steered, only judged.
+const CERTIFYING: f64 = 1e-6;
 
 /// What a step stands on.
 pub(crate) struct Conditioned<'a> {
@@ -103,6 +107,42 @@ impl<'a> Conditioned<'a> {
             }
         }
         Ok(Ok(0))
+    }
+
+    /// What is left to gain from `y` as a Gauss-Newton step with hardly any damping foresees it,
+    /// `½ gᵀM⁻¹g` with the gradient on the conditions; none if it was stopped, or without a matrix.
+    pub(crate) fn foreseen_gain(
+        &mut self,
+        y: &[f64],
+        observer: &mut dyn Observer,
+    ) -> Result<Option<f64>, SolverError> {
+        if self.steering.metric.is_none() {
+            return Ok(None);
+        }
+        self.energy.refresh(y);
+        let mut gradient = vec![0.0; y.len()];
+        self.energy.value(y, &mut gradient);
+        let rows = self.condition_rows(y);
+        self.keep(Vec::new(), false);
+        if self.factor(y, true, CERTIFYING, observer)?.is_err() {
+            return Ok(None);
+        }
+        self.energy.refresh(y);
+        self.keep(rows, true);
+        let mut step = gradient.clone();
+        self.steering.apply_inverse(&mut step);
+        Ok(Some(0.5 * dot(&gradient, &step)))
+    }
+
+    /// Gives the level a matrix where its method needs none.
+    pub(crate) fn with_metric(
+        &mut self,
+        make: impl FnOnce(&LevelEnergy<'a>) -> Result<MetricAssembly, SolverError>,
+    ) -> Result<(), SolverError> {
+        if self.steering.metric.is_none() {
+            self.steering.metric = Some(make(&self.energy)?);
+        }
+        Ok(())
     }
 
     /// Meets the linear conditions at the start.

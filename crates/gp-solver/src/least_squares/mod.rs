@@ -6,6 +6,7 @@ mod levenberg;
 mod normal;
 mod run;
 mod system;
+mod vectors;
 
 pub use inspect::Triplets;
 pub use run::{Run, Step, solve, solve_observed};

@@ -1,6 +1,7 @@
 //! A problem linearised at an iterate, and single steps from it.
 
 use super::normal::{NormalPlan, Scratch};
+use super::vectors::VectorPlan;
 use crate::block::{Block, ResidualBlock};
 use crate::clock::Instant;
 use crate::error::{Quantity, SolverError};
@@ -36,6 +37,7 @@ pub struct System<'a> {
     /// Scaling `D` of steps: the diagonal, or its running maximum.
     scaling: Vec<f64>,
     keeps_scaling: bool,
+    vectors: VectorPlan,
     terms: Vec<f64>,
     trial: Vec<f64>,
     shift: Vec<f64>,
@@ -93,6 +95,7 @@ impl<'a> System<'a> {
             diagonal: vec![0.0; n],
             scaling: vec![0.0; n],
             keeps_scaling: false,
+            vectors: VectorPlan::new(&problem, &plan),
             terms: vec![0.0; problem.slots.len()],
             trial: vec![0.0; problem.slots.len()],
             shift: vec![0.0; n],
@@ -129,6 +132,7 @@ impl<'a> System<'a> {
         let id = self.problem.push(block);
         if !fits {
             (self.plan, self.factor) = NormalPlan::new(&self.problem, self.wanted)?;
+            self.vectors = VectorPlan::new(&self.problem, &self.plan);
             self.matrix = vec![0.0; self.factor.values_len()];
             self.forget_constant();
         }
@@ -239,8 +243,9 @@ impl<'a> System<'a> {
         &self.gradient
     }
 
-    /// Diagonal of the normal matrix at the last linearisation, by position; where it is zero
-    /// the unknown's natural size stands in.
+    /// Diagonal of the normal matrix at the last linearisation, by position, its mean over the
+    /// components of a [vector](crate::Variables::set_vectors); where it is zero the unknown's
+    /// natural size stands in.
     #[must_use]
     pub fn diagonal(&self) -> &[f64] {
         &self.diagonal
@@ -412,8 +417,11 @@ impl<'a> System<'a> {
             let size = self.problem.variables.sizes()[self.plan.variable[i]];
             // Exact Hessians of energies can have negative diagonals.
             self.diagonal[i] = if a != 0.0 { a.abs() } else { 1.0 / (size * size) };
-            let least = if self.keeps_scaling { self.scaling[i] } else { 0.0 };
-            self.scaling[i] = self.diagonal[i].max(least);
+        }
+        self.vectors.average(&mut self.diagonal);
+        for (scaling, &diagonal) in self.scaling.iter_mut().zip(&self.diagonal) {
+            let least = if self.keeps_scaling { *scaling } else { 0.0 };
+            *scaling = diagonal.max(least);
         }
     }
 
@@ -533,15 +541,23 @@ impl<'a> System<'a> {
         self.plan.variable.iter().zip(&self.scaling).map(term).sum::<f64>().sqrt()
     }
 
-    /// `max_i |g_i| / √(A_ii · 2E)`, 0 where the energy is.
+    /// `max_i |g_i| / √(A_ii · 2E)`, 0 where the energy is. Of a
+    /// [vector](crate::Variables::set_vectors) the length of its gradient and the mean of its
+    /// diagonal count.
     #[must_use]
     pub fn scaled_gradient_norm(&self) -> f64 {
         if self.energy == 0.0 {
             return 0.0;
         }
         let scale = 2.0 * self.energy.abs();
-        let cosine = |(&g, &d): (&f64, &f64)| g.abs() / (d * scale).sqrt();
-        self.gradient.iter().zip(&self.diagonal).map(cosine).fold(0.0, f64::max)
+        if self.vectors.is_empty() {
+            let cosine = |(&g, &d): (&f64, &f64)| g.abs() / (d * scale).sqrt();
+            return self.gradient.iter().zip(&self.diagonal).map(cosine).fold(0.0, f64::max);
+        }
+        let mut squares: Vec<f64> = self.gradient.iter().map(|g| g * g).collect();
+        self.vectors.sum(&mut squares);
+        let cosine = |(&g, &d): (&f64, &f64)| (g / (d * scale)).sqrt();
+        squares.iter().zip(&self.diagonal).map(cosine).fold(0.0, f64::max)
     }
 
     pub(super) fn plan(&self) -> &NormalPlan {

@@ -3,7 +3,7 @@
 mod lamellas;
 mod page;
 
-use crate::args::{ConfigArgs, OutputArgs, ReportArgs, check_output_path};
+use crate::args::{ConfigArgs, EndingArgs, OutputArgs, ReportArgs, check_output_path};
 use crate::context::Context;
 use crate::failure::Failure;
 use crate::option_flags::{OptionFlags, in_flags};
@@ -34,6 +34,8 @@ pub(crate) struct Asymptotic {
     #[command(flatten)]
     config: ConfigArgs,
     #[command(flatten)]
+    ending: EndingArgs,
+    #[command(flatten)]
     report: ReportArgs,
 }
 
@@ -63,6 +65,7 @@ impl Asymptotic {
         let mut outcome = Outcome::new(result.report.status, iterations)
             .with_input(&self.data)
             .with_metrics(&result.metrics)?;
+        self.ending.apply(&mut outcome);
         for path in self.output.output {
             let model = model_for(&path, &result, &unit)?;
             let bytes =
