@@ -9,7 +9,7 @@ use std::time::{Duration, Instant};
 use asymptotic_bezier::{
     AsymptoticNet, CurveForm, Error, Input, Joins, NetCurve, Options, Solution, solve,
 };
-use common::{Gauss, catenoid, enneper, exact_net, sampled_net};
+use common::{Gauss, catenoid, enneper, exact_net, noisy, reference_set, sampled_net};
 use gp_solver::{Checkpoint, Observer, Progress};
 
 /// Stops at a step and keeps the last checkpoint.
@@ -97,6 +97,18 @@ fn curves_from_normals_end_with_the_same_bytes() {
     let mesh = sampled_net(enneper, [-0.5, 0.6, -0.7, 0.5], [4, 4]);
     let options = Options { curves: CurveForm::Normals, joins: Joins::C1, ..Options::default() };
     resumes_to_the_same_bytes(&mesh.into(), &options);
+}
+
+#[test]
+fn corner_data_ends_with_the_same_bytes() {
+    let data = noisy(&reference_set("skew catenoid").data, 0.01, 2);
+    resumes_to_the_same_bytes(&data.into(), &Options { relaxed: true, ..Options::default() });
+}
+
+#[test]
+fn nets_by_default_end_with_the_same_bytes() {
+    let mesh = sampled_net(enneper, [-0.5, 0.6, -0.7, 0.5], [5, 5]);
+    resumes_to_the_same_bytes(&mesh.into(), &Options::default());
 }
 
 #[test]

@@ -76,8 +76,13 @@ impl Outcome {
         bytes
     }
 
-    /// Writes all files, or none of them.
-    pub(crate) fn write_files(&self, metrics: Option<(PathBuf, Vec<u8>)>) -> Result<(), Failure> {
+    /// Writes all files, or none of them if `is_stopped` says so meanwhile; returns whether they
+    /// were written.
+    pub(crate) fn write_files(
+        &self,
+        metrics: Option<(PathBuf, Vec<u8>)>,
+        is_stopped: &dyn Fn() -> bool,
+    ) -> Result<bool, Failure> {
         let files: Vec<(&Path, &[u8])> = self
             .written()
             .chain(metrics.as_ref())
@@ -89,7 +94,7 @@ impl Outcome {
                 return Err(Failure::usage(format!("{}: {message}", path.display())));
             }
         }
-        exchange::write_files(&files).map_err(Failure::usage)
+        exchange::write_files_unless(&files, is_stopped).map_err(Failure::usage)
     }
 
     fn written(&self) -> impl Iterator<Item = &(PathBuf, Vec<u8>)> {

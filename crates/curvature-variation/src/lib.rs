@@ -44,6 +44,7 @@ mod limits;
 mod metric;
 mod metrics;
 mod options;
+mod replay;
 mod rules;
 mod samples;
 mod schedule;

@@ -41,7 +41,7 @@ mod wrapped;
 pub use csv::write_csv;
 pub use drawing::{Drawing, DrawnLine, Label, write_dxf, write_svg};
 pub use error::{ReadError, WriteError};
-pub use files::{check_writable, read_bytes, read_text, write_files};
+pub use files::{check_writable, read_bytes, read_text, write_files, write_files_unless};
 pub use format::{
     READABLE, WRITABLE, check_format, decode_model, encode_model, extension_of, read_model,
 };

@@ -104,6 +104,10 @@ pub fn solve_with(
         checkpoint.check(METHOD, fingerprint)?;
     }
     let first = resume.as_ref().map_or(0, |c| c.stage);
+    let mut steps = match &resume {
+        Some(checkpoint) => checkpoint.counts("steps")?.first().map_or(0, |n| *n as usize),
+        None => 0,
+    };
     let mut stages: Vec<StageReport> = Vec::new();
     let mut done: Option<(Level, SampledSurface, BsplineSurface)> = None;
     for number in first..schedule.len() {
@@ -120,8 +124,9 @@ pub fn solve_with(
         if let Some(checkpoint) = resumed {
             run.resume(checkpoint)?;
         }
-        let mut watch = Watch { observer, stage: &level.stage, start: &origin, fingerprint };
+        let mut watch = Watch { observer, stage: &level.stage, start: &origin, steps, fingerprint };
         let status = run.go_on(&level.stage, &mut watch)?;
+        steps += run.iterations();
         let working = level.surface(&run.x()[..level.unknowns()])?;
         stages.push(StageReport { stage: level.stage.clone(), solver: run.report(status) });
         let start = level.sampled(&origin)?;
@@ -134,7 +139,8 @@ pub fn solve_with(
         let what = "a run with more levels".to_owned();
         return Err(gp_solver::SolverError::ForeignCheckpoint { what }.into());
     };
-    finish(surface, options, &level, &start, &working, stages)
+    let report = RunReport { iterations: steps, ..RunReport::of_stages(stages) };
+    finish(surface, options, &level, &start, &working, report)
 }
 
 /// The problem of the first level, at its start.
@@ -154,9 +160,8 @@ fn finish(
     level: &Level,
     start: &SampledSurface,
     working: &BsplineSurface,
-    stages: Vec<StageReport>,
+    report: RunReport,
 ) -> Result<Solution, Error> {
-    let report = RunReport::of_stages(stages);
     // A net nothing has moved is the input itself, to the last bit.
     let is_input = report.iterations == 0 && options.levels.is_empty() && options.moves.is_empty();
     let result = if is_input { input.clone() } else { scaled(working, 1.0 / level.stage.unit)? };
@@ -179,6 +184,7 @@ fn fingerprint(surface: &BsplineSurface, options: &Options) -> u64 {
     for point in surface.control_points() {
         of = of.numbers(&point.to_array());
     }
+    of = of.counts([surface.n_u() as u64, surface.n_v() as u64]);
     of = of.numbers(surface.knots_u().knots()).numbers(surface.knots_v().knots());
     if let Some(weights) = surface.weights() {
         of = of.numbers(weights);
@@ -192,6 +198,8 @@ struct Watch<'o> {
     observer: &'o mut dyn Observer,
     stage: &'o Stage,
     start: &'o [f64],
+    /// Steps of the levels that are done.
+    steps: usize,
     fingerprint: u64,
 }
 
@@ -208,8 +216,9 @@ impl Observer for Watch<'_> {
 
     fn checkpoint(&mut self, state: &dyn Fn() -> Checkpoint) {
         let (stage, start, fingerprint) = (self.stage.number, self.start, self.fingerprint);
+        let steps = [self.steps as u64];
         self.observer.checkpoint(&|| {
-            let state = state().with_numbers("start", start);
+            let state = state().with_numbers("start", start).with_counts("steps", &steps);
             Checkpoint { method: METHOD.to_owned(), fingerprint, stage, ..state }
         });
     }

@@ -55,8 +55,8 @@ impl Darboux {
         self.report.check()?;
         net_files::check_outputs(&self.output.output, &["glb", "obj", "ply", "stl"])?;
         let options = self.options()?;
+        let mut watch = Watch::new(context, "net").of(&self.input);
         let (input, unit, mut warnings) = net_files::read(&self.input)?;
-        let mut watch = Watch::new(context, "net");
         let (surface, status, steps) = match input {
             NetInput::Net(surface) => (*surface, Status::Converged, 0),
             NetInput::Mesh(mesh) => self.solve(&mesh, &mut watch, &mut warnings)?,
@@ -71,6 +71,11 @@ impl Darboux {
         let mut outcome =
             Outcome::new(status, steps).with_input(&self.input).with_metrics(metrics)?;
         outcome.require_converged = self.converged.require_converged;
+        outcome.summary = summary(metrics, &unit.to_string());
+        outcome.warnings = warnings;
+        if !watch.finish(&mut outcome) {
+            return Ok(outcome);
+        }
         for path in self.output.output {
             let mesh = net_files::sampled_mesh("Darboux transform", sampled);
             let model = Model::of_mesh(mesh, unit.clone());
@@ -78,8 +83,6 @@ impl Darboux {
                 exchange::encode_model(&path, &model).map_err(|e| Failure::input(&path, e))?;
             outcome.files.push((path, bytes));
         }
-        outcome.summary = summary(metrics, &unit.to_string());
-        outcome.warnings = warnings;
         if self.report.wanted() {
             let mut page = net_report::page("Darboux transform", &self.input, &unit);
             net_report::add_net(&mut page, &surface, &unit.to_string())?;

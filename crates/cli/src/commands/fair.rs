@@ -1,6 +1,7 @@
 //! `umbilic fair QUADS -o OUT`.
 
-use crate::args::{CheckpointArgs, ConfigArgs, ConvergedArgs, OutputArgs, ReportArgs};
+use crate::args::{ConfigArgs, ConvergedArgs, OutputArgs, ReportArgs};
+use crate::checkpoints::CheckpointArgs;
 use crate::context::Context;
 use crate::failure::Failure;
 use crate::option_flags::{OptionFlags, list, refused};
@@ -8,11 +9,12 @@ use crate::outcome::Outcome;
 use crate::report_support;
 use crate::watch::Watch;
 use curvature_variation::{
-    Constraints, Functional, Input, Options, Solution, SplinePatches, SurfaceSamples, solve,
+    Constraints, Error, Functional, Input, Options, Solution, SplinePatches, SurfaceSamples, solve,
     spline_patches,
 };
 use exchange::{Field, LengthUnit, Mesh, Model, NamedSurface};
 use geom_core::{DVec3, UmbilicKind};
+use gp_solver::SolverError;
 use report::{EnergyHistory, FieldScale, LineRole, LineSet, ScalarField, Series, SurfaceView};
 use serde::Deserialize;
 use std::collections::BTreeMap;
@@ -72,13 +74,26 @@ impl Fair {
                 "--family leaves no vertex to fix; drop --fix, --creases and --clamp-boundary",
             ));
         }
+        let mut watch =
+            Watch::new(context, "fairing").of(&self.input).with_checkpoints(&self.checkpoint)?;
         let model =
             exchange::read_model(&self.input).map_err(|e| Failure::input(&self.input, e))?;
         let input = self.read(&model)?;
-        let mut watch = Watch::new(context, "fairing").with_checkpoints(&self.checkpoint)?;
-        let mut result =
-            solve(&input, &options, &mut watch).map_err(|e| refused::<Options>(&self.input, e))?;
+        let mut result = solve(&input, &options, &mut watch).map_err(|e| match e {
+            Error::Solver(e @ SolverError::ForeignCheckpoint { .. }) => watch.foreign(&e),
+            e => refused::<Options>(&self.input, e),
+        })?;
         result.metrics.peak_memory_mb = peak_memory_mb();
+        let mut outcome = Outcome::new(result.report.status, result.report.iterations)
+            .with_input(&self.input)
+            .with_metrics(&result.metrics)?;
+        outcome.summary = summary(&result, &options);
+        outcome.warnings.clone_from(&model.warnings);
+        outcome.warnings.extend(result.warnings.iter().map(ToString::to_string));
+        outcome.require_converged = self.converged.require_converged;
+        if !watch.finish(&mut outcome) {
+            return Ok(outcome);
+        }
         let splines = match self.output.output.iter().find(|path| is_spline_file(path)) {
             Some(path) => Some(
                 spline_patches(&result.result, &result.surface)
@@ -88,18 +103,10 @@ impl Fair {
         };
         if let Some(splines) = &splines {
             result.metrics.add_splines(splines);
+            outcome = outcome.with_metrics(&result.metrics)?;
+            outcome.warnings.extend(splines.warning(&result.result).map(|w| w.to_string()));
+            outcome.summary.push(spline_summary(splines));
         }
-        let mut outcome = Outcome::new(result.report.status, result.report.iterations)
-            .with_input(&self.input)
-            .with_metrics(&result.metrics)?;
-        watch.finish(&mut outcome)?;
-        outcome.summary = summary(&result, &options);
-        outcome.warnings.clone_from(&model.warnings);
-        let fitted = splines.as_ref().and_then(|s| s.warning(&result.result));
-        let warnings = fitted.iter().chain(&result.warnings);
-        outcome.warnings.extend(warnings.map(ToString::to_string));
-        outcome.summary.extend(splines.as_ref().map(spline_summary));
-        outcome.require_converged = self.converged.require_converged;
         for path in self.output.output {
             let content = content_for(&path, &result, splines.as_ref(), &model.unit);
             let bytes =

@@ -1,6 +1,7 @@
 //! `umbilic panel SURFACE -o OUT`.
 
-use crate::args::{CheckpointArgs, ConfigArgs, ConvergedArgs, ReportArgs, check_output_path};
+use crate::args::{ConfigArgs, ConvergedArgs, ReportArgs, check_output_path};
+use crate::checkpoints::CheckpointArgs;
 use crate::context::Context;
 use crate::failure::Failure;
 use crate::option_flags::{OptionFlags, list, refused};
@@ -12,6 +13,7 @@ use crate::surface_file::read_surface;
 use crate::watch::Watch;
 use bspline::BsplineSurface;
 use exchange::LengthUnit;
+use gp_solver::SolverError;
 use paneling::{Error, Input, Layout, MoldType, Options, Paneling, PriceList, Solution, solve};
 use std::path::{Path, PathBuf};
 
@@ -75,6 +77,9 @@ impl Panel {
         self.check_outputs()?;
         self.report.check()?;
         let options = self.options.options(&self.config)?;
+        let mut watch = Watch::new(context, "panelling")
+            .of(&self.surface)
+            .with_checkpoints(&self.checkpoint)?;
         let (model, named) = read_surface(&self.surface)?;
         let unit = model.unit;
         let layout = layout(self.options.file("layout"), &options, &named.surface)?;
@@ -86,22 +91,23 @@ impl Panel {
         if let Some(layout) = &layout {
             input = input.with_layout(layout);
         }
-        let mut watch = Watch::new(context, "panelling").with_checkpoints(&self.checkpoint)?;
-        let solution = solve(input, &options, &mut watch).map_err(|e| {
-            let file = match (&e, &self.prices) {
-                (Error::NoPrice { .. } | Error::BadPrice { .. }, Some(prices)) => prices,
-                _ => &self.surface,
-            };
-            refused::<Options>(file, e)
+        let solution = solve(input, &options, &mut watch).map_err(|e| match (e, &self.prices) {
+            (Error::Solver(e @ SolverError::ForeignCheckpoint { .. }), _) => watch.foreign(&e),
+            (e @ (Error::NoPrice { .. } | Error::BadPrice { .. }), Some(prices)) => {
+                refused::<Options>(prices, e)
+            }
+            (e, _) => refused::<Options>(&self.surface, e),
         })?;
         let (paneling, set) = (&solution.result, &solution.panels);
         let mut outcome = Outcome::new(solution.report.status, paneling.iterations())
             .with_input(&self.surface)
             .with_metrics(&solution.metrics)?;
-        watch.finish(&mut outcome)?;
         outcome.warnings = model.warnings;
         outcome.require_converged = self.converged.require_converged;
         outcome.summary = summary(&solution, &unit);
+        if !watch.finish(&mut outcome) {
+            return Ok(outcome);
+        }
         for path in self.output {
             let sheet = options.sheet.map(|s| [s.width, s.height]);
             let files = encode(&path, set, paneling, &unit, sheet)?;

@@ -1,6 +1,7 @@
 //! `umbilic weingarten SURFACE -o OUT`.
 
-use crate::args::{CheckpointArgs, ConfigArgs, ConvergedArgs, OutputArgs, ReportArgs, SystemArgs};
+use crate::args::{ConfigArgs, ConvergedArgs, OutputArgs, ReportArgs, SystemArgs};
+use crate::checkpoints::CheckpointArgs;
 use crate::context::Context;
 use crate::failure::Failure;
 use crate::option_flags::{OptionFlags, refused};
@@ -10,9 +11,10 @@ use crate::report_support::weingarten::weingarten_report;
 use crate::surface_file::read_surface;
 use crate::watch::Watch;
 use exchange::{LengthUnit, Model};
+use gp_solver::SolverError;
 use serde::Serialize;
 use std::path::PathBuf;
-use weingarten::{Metrics, Options, Solution, solve};
+use weingarten::{Error, Metrics, Options, Solution, solve};
 
 /// Arguments of `weingarten`.
 #[derive(Debug, clap::Args)]
@@ -46,16 +48,21 @@ impl Weingarten {
         self.output.check()?;
         self.report.check()?;
         let options = self.options.options(&self.config)?;
-        let (model, named) = read_surface(&self.input)?;
         let mut watch = Watch::new(context, "optimising")
+            .of(&self.input)
             .with_checkpoints(&self.checkpoint)?
             .with_systems(self.system.dump_system.as_deref())?;
-        let solution = solve(&named.surface, &options, &mut watch)
-            .map_err(|e| refused::<Options>(&self.input, e))?;
+        let (model, named) = read_surface(&self.input)?;
+        let solution = solve(&named.surface, &options, &mut watch).map_err(|e| match e {
+            Error::Solver(e @ SolverError::ForeignCheckpoint { .. }) => watch.foreign(&e),
+            e => refused::<Options>(&self.input, e),
+        })?;
         let mut outcome = outcome(&solution, &model.unit)?.with_input(&self.input);
-        watch.finish(&mut outcome)?;
         outcome.warnings = model.warnings;
         outcome.require_converged = self.converged.require_converged;
+        if !watch.finish(&mut outcome) {
+            return Ok(outcome);
+        }
         let report = match self.report.wanted() {
             true => {
                 let unit = model.unit.to_string();

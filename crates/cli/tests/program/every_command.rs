@@ -2,6 +2,8 @@
 
 #![allow(clippy::unwrap_used, reason = "a test may stop at the first surprise")]
 
+#[cfg(unix)]
+use crate::common::{copy, examples};
 use crate::common::{message, root, umbilic, write_into};
 use std::fs;
 use std::path::Path;
@@ -53,30 +55,6 @@ fn analyze_measures_a_sphere() {
     assert_eq!(json["metrics"]["kind"], "rational_bspline_surface");
     let k = json["metrics"]["gaussian_curvature_mean_abs"].as_f64().unwrap();
     assert!((k - 1.0).abs() < 1e-9, "{k}");
-}
-
-/// The command lines a help text gives as examples: after `Example:` or indented below it, a `\`
-/// at the end continuing the line.
-#[cfg(unix)]
-fn examples(help: &str) -> Vec<String> {
-    let joined = help.replace("\\\n", " ");
-    let lines = joined.lines().map(|l| l.strip_prefix("Example: ").unwrap_or(l).trim_start());
-    lines.filter(|l| l.starts_with("umbilic ")).map(str::to_owned).collect()
-}
-
-/// A copy of a folder.
-#[cfg(unix)]
-fn copy(from: &Path, to: &Path) {
-    fs::create_dir(to).unwrap();
-    for entry in fs::read_dir(from).unwrap() {
-        let path = entry.unwrap().path();
-        let target = to.join(path.file_name().unwrap());
-        if path.is_dir() {
-            copy(&path, &target);
-        } else {
-            fs::copy(&path, target).unwrap();
-        }
-    }
 }
 
 #[cfg(unix)]

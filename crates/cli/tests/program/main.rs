@@ -15,4 +15,12 @@ mod hyperbolic;
 mod interruptions;
 mod panel;
 mod report;
+#[cfg(unix)]
+mod resume;
 mod weingarten;
+
+#[cfg(not(unix))]
+#[test]
+fn interruptions() {
+    eprintln!("SKIPPED interruptions and resume: this platform has no signal for Ctrl-C");
+}

@@ -4,6 +4,7 @@ mod lamellas;
 mod page;
 
 use crate::args::{ConfigArgs, OutputArgs, ReportArgs, check_output_path};
+use crate::checkpoints::CheckpointArgs;
 use crate::context::Context;
 use crate::failure::Failure;
 use crate::option_flags::{OptionFlags, in_flags};
@@ -12,6 +13,7 @@ use crate::watch::Watch;
 use asymptotic_bezier::{DataFile, Error, Input, Options, Solution, solve};
 use bspline::{BsplineSurface, Degree, KnotVector};
 use exchange::{LengthUnit, Mesh, Model, NamedSurface};
+use gp_solver::SolverError;
 use std::path::{Path, PathBuf};
 
 /// Arguments of `asymptotic`.
@@ -34,6 +36,8 @@ pub(crate) struct Asymptotic {
     #[command(flatten)]
     config: ConfigArgs,
     #[command(flatten)]
+    checkpoint: CheckpointArgs,
+    #[command(flatten)]
     report: ReportArgs,
 }
 
@@ -50,12 +54,16 @@ impl Asymptotic {
         }
         let said = |e: &dyn std::fmt::Display| in_flags::<Options>(&e.to_string());
         options.check().map_err(|e| Failure::usage(said(&e)))?;
+        let mut watch =
+            Watch::new(context, "solving").of(&self.data).with_checkpoints(&self.checkpoint)?;
         let (input, unit) = read_input(&self.data, &options)?;
-        let mut watch = Watch::new(context, "solving");
         let result = match solve(&input, &options, &mut watch) {
             Ok(result) => result,
             Err(Error::Interrupted { .. }) => {
                 return Ok(Outcome::new(Status::Interrupted, 0).with_input(&self.data));
+            }
+            Err(Error::Solver(e @ SolverError::ForeignCheckpoint { .. })) => {
+                return Err(watch.foreign(&e));
             }
             Err(error) => return Err(Failure::input(&self.data, said(&error))),
         };
@@ -63,6 +71,11 @@ impl Asymptotic {
         let mut outcome = Outcome::new(result.report.status, iterations)
             .with_input(&self.data)
             .with_metrics(&result.metrics)?;
+        outcome.summary = summary(&result, &unit);
+        outcome.warnings = result.warnings.iter().map(|w| said(w)).collect();
+        if !watch.finish(&mut outcome) {
+            return Ok(outcome);
+        }
         for path in self.output.output {
             let model = model_for(&path, &result, &unit)?;
             let bytes =
@@ -72,8 +85,6 @@ impl Asymptotic {
         if let Some(folder) = &self.lamellas {
             outcome.files.extend(lamellas::files(folder, &result, &options, &unit));
         }
-        outcome.summary = summary(&result, &unit);
-        outcome.warnings = result.warnings.iter().map(|w| said(w)).collect();
         if self.report.wanted() {
             page::add(&mut outcome, &self.report, context, &result, unit)?;
         }
