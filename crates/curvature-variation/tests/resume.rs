@@ -46,7 +46,7 @@ fn bits(solution: &Solution) -> Vec<[u64; 3]> {
 fn ends_with_the_same_bytes(input: &Input, options: &Options) {
     let mut whole = Keeper::default();
     let want = solve(input, options, &mut whole).expect("it can be faired");
-    assert!(whole.steps >= 10, "{} steps", whole.steps);
+    assert!(whole.steps > 4, "{} steps", whole.steps);
     for moment in 0..10 {
         let steps = moment * whole.steps / 10;
         let mut first = Keeper { steps_left: Some(steps), ..Keeper::default() };

@@ -140,7 +140,7 @@ fn ctrl_c_at_any_moment_ends_every_command_within_a_second() {
             "surface.ron --panels 30x30 -o out.glb --report page.html",
             "fixtures/roof-optimised.ron --panels 16x16 --max-kink-deg 1 -o out.csv",
         ],
-        "weingarten" => vec!["surface.ron --iterations 2 -o out.step"],
+        "weingarten" => vec!["surface.ron --iterations 1 -o out.step"],
         _ => vec![],
     };
     let before: Vec<String> = names(folder.path());
