@@ -70,6 +70,17 @@ impl BsplineCurve {
     }
 
     /// The point at parameter `t`.
+    ///
+    /// # Example
+    /// ```
+    /// use bspline::{BsplineCurve, Degree, KnotVector};
+    /// use geom_core::DVec3;
+    /// // A parabola as a Bézier curve: its middle is half way to the middle control point.
+    /// let knots = KnotVector::clamped_uniform(Degree::new(2)?, 3)?;
+    /// let parabola = BsplineCurve::new(knots, vec![-DVec3::X, 2.0 * DVec3::Y, DVec3::X], None)?;
+    /// assert_eq!(parabola.point(0.5), DVec3::Y);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
     #[must_use]
     pub fn point(&self, t: f64) -> DVec3 {
         self.derivatives(t, 0)[0]

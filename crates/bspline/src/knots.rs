@@ -147,6 +147,14 @@ impl KnotVector {
     ///
     /// # Errors
     /// [`KnotError::TooFewControlPoints`] if `n` is below `degree + 1`.
+    ///
+    /// # Example
+    /// ```
+    /// use bspline::{Degree, KnotVector};
+    /// let knots = KnotVector::clamped_uniform(Degree::new(1)?, 3)?;
+    /// assert_eq!(knots.knots(), [0.0, 0.0, 0.5, 1.0, 1.0]);
+    /// # Ok::<(), bspline::KnotError>(())
+    /// ```
     pub fn clamped_uniform(degree: Degree, n: usize) -> Result<Self, KnotError> {
         let d = degree.get();
         if n < degree.order() {
@@ -254,6 +262,15 @@ impl KnotVector {
 
     /// Knots of the domain without repetition, both ends included: the ends of the polynomial
     /// pieces.
+    ///
+    /// # Example
+    /// ```
+    /// use bspline::{Degree, KnotVector};
+    /// let knots = KnotVector::new(Degree::new(1)?, vec![0.0, 0.0, 0.5, 0.5, 2.0, 2.0])?;
+    /// assert_eq!(knots.breaks(), [0.0, 0.5, 2.0]);
+    /// assert_eq!((knots.domain(), knots.multiplicity(0.5)), ((0.0, 2.0), 2));
+    /// # Ok::<(), bspline::KnotError>(())
+    /// ```
     #[must_use]
     pub fn breaks(&self) -> Vec<f64> {
         let d = self.degree.get();
@@ -364,6 +381,16 @@ impl KnotVector {
     }
 
     /// `count` parameters at equal distances over the domain; the end is left out if periodic.
+    ///
+    /// # Example
+    /// ```
+    /// use bspline::{Degree, KnotVector};
+    /// let knots = KnotVector::clamped_uniform(Degree::new(2)?, 5)?;
+    /// assert_eq!(knots.uniform_parameters(3), [0.0, 0.5, 1.0]);
+    /// let closed = KnotVector::periodic_uniform(Degree::new(2)?, 5)?;
+    /// assert_eq!(closed.uniform_parameters(2), [0.0, 0.5]);
+    /// # Ok::<(), bspline::KnotError>(())
+    /// ```
     #[must_use]
     pub fn uniform_parameters(&self, count: usize) -> Vec<f64> {
         let (start, end) = self.domain();

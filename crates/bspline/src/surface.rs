@@ -118,6 +118,17 @@ impl BsplineSurface {
     }
 
     /// The point at `(u, v)`.
+    ///
+    /// # Example
+    /// ```
+    /// use bspline::{BsplineSurface, Degree, KnotVector};
+    /// use geom_core::DVec3;
+    /// let knots = KnotVector::clamped_uniform(Degree::new(1)?, 2)?;
+    /// let corners = vec![DVec3::ZERO, DVec3::Y, DVec3::X, DVec3::new(1.0, 1.0, 4.0)];
+    /// let saddle = BsplineSurface::new(knots.clone(), knots, corners, None)?;
+    /// assert_eq!(saddle.point(0.5, 0.5), DVec3::new(0.5, 0.5, 1.0));
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
     #[must_use]
     pub fn point(&self, u: f64, v: f64) -> DVec3 {
         self.jet(u, v, 0).position()

@@ -99,6 +99,21 @@ impl<'a> Problem<'a> {
     ///
     /// # Errors
     /// [`SolverError::NoSuchBlock`], [`SolverError::BadOption`] unless `0 ≤ weight < ∞`.
+    ///
+    /// # Example
+    /// ```
+    /// use gp_solver::{Closeness, Options, Problem, solve};
+    /// let mut problem = Problem::new(1);
+    /// problem.add(Closeness::new("here", vec![0.0], vec![1.0]));
+    /// let there = problem.add(Closeness::new("there", vec![4.0], vec![1.0]));
+    /// problem.set_weight(there, 3.0)?;
+    /// assert_eq!(problem.weight(there)?, 3.0);
+    /// // Least squares: the squares of the weights share the way.
+    /// let mut x = [0.0];
+    /// solve(problem, &mut x, &Options::default())?;
+    /// assert!((x[0] - 4.0 * 9.0 / (1.0 + 9.0)).abs() < 1e-6);
+    /// # Ok::<(), gp_solver::SolverError>(())
+    /// ```
     pub fn set_weight(&mut self, block: BlockId, weight: f64) -> Result<(), SolverError> {
         if !(weight >= 0.0 && weight.is_finite()) {
             let need = "zero or more, and finite";

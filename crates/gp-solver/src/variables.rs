@@ -84,6 +84,16 @@ impl Group {
     }
 
     /// Numbers of the unknowns of an item.
+    ///
+    /// # Example
+    /// ```
+    /// use gp_solver::Variables;
+    /// let mut variables = Variables::new();
+    /// variables.add("time", 1, 1);
+    /// let points = variables.add("points", 4, 3);
+    /// assert_eq!(points.columns::<3>(2), [7, 8, 9]);
+    /// assert_eq!(points.column(2, 1), 8);
+    /// ```
     #[must_use]
     pub fn columns<const W: usize>(self, item: usize) -> [usize; W] {
         debug_assert_eq!(W, self.width, "one number per component");
@@ -98,6 +108,17 @@ impl Group {
     }
 
     /// Sets the value of an item in a vector of all unknowns.
+    ///
+    /// # Example
+    /// ```
+    /// use gp_solver::Variables;
+    /// let mut variables = Variables::new();
+    /// let points = variables.add("points", 2, 3);
+    /// let mut x = vec![0.0; variables.len()];
+    /// points.set(&mut x, 1, [1.0, 2.0, 3.0]);
+    /// assert_eq!(x, [0.0, 0.0, 0.0, 1.0, 2.0, 3.0]);
+    /// assert_eq!(points.get::<3>(&x, 1), [1.0, 2.0, 3.0]);
+    /// ```
     pub fn set<const W: usize>(self, x: &mut [f64], item: usize, value: [f64; W]) {
         let first = self.column(item, 0);
         x[first..first + W].copy_from_slice(&value);

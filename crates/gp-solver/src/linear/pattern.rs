@@ -127,6 +127,15 @@ impl SymmetricPattern {
     }
 
     /// Where the value of entry `(row, column)` or its mirror image stands.
+    ///
+    /// # Example
+    /// ```
+    /// use gp_solver::SymmetricPattern;
+    /// let pattern = SymmetricPattern::new(3, [(1, 0)])?;
+    /// assert_eq!(pattern.slot(0, 1), pattern.slot(1, 0));
+    /// assert_eq!(pattern.slot(0, 2), None);
+    /// # Ok::<(), gp_solver::SolverError>(())
+    /// ```
     #[must_use]
     pub fn slot(&self, row: usize, column: usize) -> Option<usize> {
         let (i, j) = (row.max(column), row.min(column));
