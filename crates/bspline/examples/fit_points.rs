@@ -19,7 +19,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let mut arguments = std::env::args().skip(1);
     let n: usize = arguments.next().map_or(Ok(24), |a| a.parse())?;
     let noise: f64 = arguments.next().map_or(Ok(0.02), |a| a.parse())?;
-    let tolerance: f64 = arguments.next().map_or(Ok(0.06), |a| a.parse())?;
+    let tolerance: f64 = arguments.next().map_or(Ok(0.03), |a| a.parse())?;
     let file = arguments.next().unwrap_or_else(|| "fit_points.svg".to_owned());
 
     // A roof 10 wide and long over an uneven grid, every point off by up to `noise` in height.
