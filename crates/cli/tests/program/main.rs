@@ -15,4 +15,5 @@ mod hyperbolic;
 mod interruptions;
 mod panel;
 mod report;
+mod snapshots;
 mod weingarten;
