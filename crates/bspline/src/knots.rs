@@ -266,7 +266,7 @@ impl KnotVector {
     /// # Example
     /// ```
     /// use bspline::{Degree, KnotVector};
-    /// let knots = KnotVector::new(Degree::new(1)?, vec![0.0, 0.0, 0.5, 0.5, 2.0, 2.0])?;
+    /// let knots = KnotVector::new(Degree::new(2)?, vec![0.0, 0.0, 0.0, 0.5, 0.5, 2.0, 2.0, 2.0])?;
     /// assert_eq!(knots.breaks(), [0.0, 0.5, 2.0]);
     /// assert_eq!((knots.domain(), knots.multiplicity(0.5)), ((0.0, 2.0), 2));
     /// # Ok::<(), bspline::KnotError>(())
