@@ -12,6 +12,8 @@ use subdiv_catmull_clark::{Blend, Creases, SubdivisionSurface, refine, refinemen
 
 /// Level lines, with mean curvatures at equal distances.
 const LEVELS: usize = 12;
+/// How far inside of a patch the outermost samples lie; too little to see in the drawing.
+const BESIDE: f64 = 1e-3;
 /// Half the side of the drawing, in SVG units.
 const HALF: f64 = 350.0;
 
@@ -51,7 +53,10 @@ fn main() -> Result<(), Box<dyn Error>> {
         .iter()
         .map(|patch| {
             let jet = |k: usize| {
-                let [u, v] = [k / (n + 1), k % (n + 1)].map(|i| i as f64 / n as f64);
+                let at = [k / (n + 1), k % (n + 1)].map(|i| i as f64 / n as f64);
+                // Derivatives by u and v vanish or are infinite in an extraordinary corner, whatever
+                // the curvature is: it is measured a little way from the corners.
+                let [u, v] = at.map(|t| t.clamp(BESIDE, 1.0 - BESIDE));
                 surface.evaluate(mesh.positions(), patch, u, v)
             };
             let jets: Vec<SurfaceJet> = (0..(n + 1) * (n + 1)).map(jet).collect();
@@ -148,7 +153,7 @@ fn drawing(
     }
     writeln!(
         svg,
-        r#"<text x="{}" y="{}">mean curvature from {low:.2} (blue) to {high:.2} (yellow); control cube dashed</text>"#,
+        r#"<text x="{}" y="{}">mean curvature from {low:.3} (blue) to {high:.3} (yellow); control cube dashed</text>"#,
         corner + 15.0,
         HALF - 15.0
     )?;
