@@ -28,6 +28,20 @@ const NO_ENERGY: f64 = 1e-9;
 const FITTED_TOLERANCE: f64 = 1e-4;
 
 /// The numbers of a fairing, under the names of the metrics file.
+///
+/// # Example
+/// ```
+/// use curvature_variation::{Input, Options, solve};
+/// let torus = Input::from(fixtures::quad_graphs::torus(6, 5, 1.0, 0.3));
+/// let energy = "bending".parse()?;
+/// let options = Options { energy, levels: 0, iterations: 5, ..Options::default() };
+/// let metrics = solve(&torus, &options, &mut ())?.metrics;
+/// assert!(metrics.energy_final < metrics.energy_initial);
+/// // The total curvature of a torus is 0, whatever its shape.
+/// assert!(metrics.gauss_bonnet_residual.is_some_and(|r| r < 0.01));
+/// assert_eq!((metrics.vertices, metrics.patches), (30, 30));
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Metrics {
     /// All functionals of the result by the fine quadrature.

@@ -9,6 +9,19 @@ use crate::level::LevelNumbers;
 use crate::metrics::{Metrics, Warning};
 
 /// A faired surface with what is to be said about it.
+///
+/// # Example
+/// ```
+/// use curvature_variation::{Functional, Input, Options, solve};
+/// let torus = Input::from(fixtures::quad_graphs::torus(6, 5, 1.0, 0.3));
+/// let energy = "bending".parse()?;
+/// let options = Options { energy, levels: 0, iterations: 5, ..Options::default() };
+/// let solution = solve(&torus, &options, &mut ())?;
+/// let bending = Functional::Bending;
+/// assert!(solution.after.get(bending) < solution.before.get(bending));
+/// assert_eq!(solution.result.vertex_count(), 30);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Clone, Debug)]
 pub struct Solution {
     /// The control mesh of the result.

@@ -7,6 +7,19 @@ use geom_core::{ClosestPoint, TriMesh};
 use crate::net::{AsymptoticField, QuadNet};
 
 /// A net along the asymptotic directions of a surface, and that surface.
+///
+/// # Example
+/// ```
+/// use geom_core::{PolyMesh, TriMesh};
+/// use hyperbolic_nets::{Input, QuadNet};
+/// let model = fixtures::asymptotic_nets::scherk(6);
+/// let net = QuadNet::new(&PolyMesh::new(model.positions, &model.quads)?)?;
+/// // Near its own faces, or near a mesh of the surface.
+/// assert_eq!(Input::new(&net).mesh().positions().len(), 49);
+/// let surface = TriMesh::from_poly_mesh(net.mesh());
+/// assert_eq!(Input::near_mesh(&net, &surface).net().quads().len(), 36);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 pub struct Input<'a> {
     net: &'a QuadNet,
     mesh: Cow<'a, TriMesh>,

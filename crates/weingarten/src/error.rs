@@ -4,6 +4,15 @@ use bspline::{FitError, KnotError, SplineError};
 use gp_solver::SolverError;
 
 /// What makes it impossible to attempt an optimisation. Not converging is a status, not an error.
+///
+/// # Example
+/// ```
+/// use weingarten::{Options, solve};
+/// let roof = fixtures::surfaces::Shape::Roof.surface(8, 7, 4, 4);
+/// let options = Options { closeness: -1.0, ..Options::default() };
+/// let error = solve(&roof, &options, &mut ()).unwrap_err();
+/// assert_eq!(error.to_string(), "`closeness` is -1; it must be zero or more");
+/// ```
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 #[expect(missing_docs, reason = "the messages spell out every field")]

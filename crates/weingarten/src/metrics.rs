@@ -15,6 +15,18 @@ const CONSTANT_RATIO: f64 = 1e-9;
 /// What is reported about a surface. Everything is measured on the surface itself at the cell
 /// midpoints of a grid with twice the samples in each direction, never on auxiliary variables.
 /// Curvatures are in units of the model.
+///
+/// # Example
+/// ```
+/// use weingarten::{Options, solve};
+/// // Every surface of revolution is a Weingarten surface: its diagram is a curve.
+/// let torus = fixtures::surfaces::torus_patch(4, 3);
+/// let options = Options { iterations: 0, ..Options::default() };
+/// let metrics = solve(&torus, &options, &mut ())?.metrics;
+/// assert!(metrics.diagram_area < 1e-9 && metrics.alignment_rms < 1e-6);
+/// assert!(metrics.gaussian_curvature_min < 0.0 && metrics.gaussian_curvature_max > 0.0);
+/// # Ok::<(), weingarten::Error>(())
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
 pub struct Metrics {
     /// Root mean square sine of the angle between `∇_s H` and `∇_s K`, weighted by area and

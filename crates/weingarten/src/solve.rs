@@ -22,6 +22,21 @@ use crate::variables::{coordinates, scaled};
 const METHOD: &str = "weingarten";
 
 /// An optimised surface with what is to be said about it.
+///
+/// # Example
+/// ```
+/// use weingarten::{Options, Status, solve};
+/// let roof = fixtures::surfaces::Shape::Roof.surface(8, 7, 4, 4);
+/// let options = Options { iterations: 3, ..Options::default() };
+/// let solution = solve(&roof, &options, &mut ())?;
+/// assert_eq!(solution.report.status, Status::IterationLimit);
+/// assert_eq!((solution.result.n_u(), solution.samples), (8, [16, 14]));
+/// // What the steps did, term by term.
+/// let history = &solution.report.stages[0].solver.history;
+/// assert_eq!(history.len(), 4);
+/// assert!(history[3].energy < history[0].energy);
+/// # Ok::<(), weingarten::Error>(())
+/// ```
 #[derive(Clone, Debug)]
 pub struct Solution {
     /// The surface, in units of the model.
@@ -147,6 +162,16 @@ pub fn solve_with(
 ///
 /// # Errors
 /// As [`solve`].
+///
+/// # Example
+/// ```
+/// use weingarten::{CONTROL_POINTS, Options, problem};
+/// let roof = fixtures::surfaces::Shape::Roof.surface(8, 7, 4, 4);
+/// let problem = problem(&roof, &Options::default())?;
+/// assert_eq!(problem.variables().group(CONTROL_POINTS)?.shape(), [8, 7]);
+/// assert!(problem.blocks().any(|(_, name)| name == "alignment"));
+/// # Ok::<(), weingarten::Error>(())
+/// ```
 pub fn problem(surface: &BsplineSurface, options: &Options) -> Result<Problem<'static>, Error> {
     let level = Schedule::new(surface, options)?.level(0)?;
     let origin = coordinates(&level.reference);

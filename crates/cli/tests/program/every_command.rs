@@ -5,6 +5,8 @@
 #[cfg(unix)]
 use crate::common::{copy, examples};
 use crate::common::{message, root, umbilic, write_into};
+#[cfg(unix)]
+use crate::snapshots::redacted;
 use std::fs;
 use std::path::Path;
 use std::process::{Command, Output};
@@ -64,6 +66,7 @@ fn every_help_has_an_example_that_works_as_printed() {
     copy(&root().join("fixtures"), &folder.path().join("fixtures"));
     let programs = Path::new(env!("CARGO_BIN_EXE_umbilic")).parent().unwrap();
     let path = format!("{}:{}", programs.display(), std::env::var("PATH").unwrap());
+    let mut said = String::new();
     for command in cli::command().get_subcommands() {
         let name = command.get_name();
         let help = String::from_utf8(umbilic(&[name, "--help"]).stdout).unwrap();
@@ -76,8 +79,11 @@ fn every_help_has_an_example_that_works_as_printed() {
             let output = shell.output().unwrap();
             assert_eq!(code(&output), 0, "{line}: {}", message(&output));
             assert_eq!(message(&output), "", "{line}");
+            let summary = redacted(std::str::from_utf8(&output.stdout).unwrap());
+            said += &format!("$ {line}\n{summary}\n");
         }
     }
+    insta::assert_snapshot!("summaries", said);
 }
 
 #[test]

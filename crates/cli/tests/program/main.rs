@@ -17,6 +17,7 @@ mod panel;
 mod report;
 #[cfg(unix)]
 mod resume;
+mod snapshots;
 mod weingarten;
 
 #[cfg(not(unix))]
