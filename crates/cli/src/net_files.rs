@@ -93,7 +93,7 @@ pub(crate) fn encode(
             let mut surfaces = Vec::with_capacity(surface.shape().len());
             for (face, patch) in surface.patches().map_err(Failure::other)?.iter().enumerate() {
                 let surface = patch.to_surface().map_err(Failure::other)?;
-                surfaces.push(NamedSurface { name: format!("panel {face}"), surface });
+                surfaces.push(NamedSurface::new(format!("panel {face}"), surface));
             }
             write(&Model { unit: unit.clone(), surfaces, ..Model::default() })
         }

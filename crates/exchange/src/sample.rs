@@ -1,6 +1,7 @@
 //! Surfaces as meshes with exact normals and curvatures, for formats that know no splines.
 
 use crate::mesh::{Field, IndexLists, Mesh};
+use crate::model::NamedSurface;
 use bspline::{BsplineSurface, KnotVector};
 use geom_core::{SurfaceJet, principal_curvatures};
 
@@ -20,16 +21,43 @@ pub fn surface_mesh(name: &str, surface: &BsplineSurface, cells: Option<(usize, 
     let (cells_u, cells_v) = cells.unwrap_or_else(|| (default_cells(ku), default_cells(kv)));
     let (us, vs) = (parameters(ku, cells_u), parameters(kv, cells_v));
     let jets = surface.jet_grid(&us, &vs, 2);
+    let at = |k: usize| [us[k / vs.len()], vs[k % vs.len()]];
+    let faces = grid_faces(us.len(), vs.len(), cells_u, cells_v);
+    with_curvatures(name, surface, &jets, at, faces)
+}
+
+/// As [`surface_mesh`], of the part that counts: triangles where the surface is trimmed.
+#[must_use]
+pub fn face_mesh(face: &NamedSurface, cells: Option<(usize, usize)>) -> Mesh {
+    let Some(trim) = &face.trim else { return surface_mesh(&face.name, &face.surface, cells) };
+    let (ku, kv) = (face.surface.knots_u(), face.surface.knots_v());
+    let (cells_u, cells_v) = cells.unwrap_or_else(|| (default_cells(ku), default_cells(kv)));
+    let made =
+        trim.triangles(&ku.uniform_parameters(cells_u + 1), &kv.uniform_parameters(cells_v + 1));
+    let jets = face.surface.jets(&made.parameters, 2);
+    let faces = made.triangles.iter().collect();
+    with_curvatures(&face.name, &face.surface, &jets, |k| made.parameters[k], faces)
+}
+
+/// The mesh over jets at parameters, with normals and curvatures.
+fn with_curvatures(
+    name: &str,
+    surface: &BsplineSurface,
+    jets: &[SurfaceJet],
+    at: impl Fn(usize) -> [f64; 2],
+    faces: IndexLists,
+) -> Mesh {
+    let (ku, kv) = (surface.knots_u(), surface.knots_v());
     let mut mesh = Mesh {
         name: name.to_owned(),
         positions: jets.iter().map(SurfaceJet::position).collect(),
-        faces: grid_faces(us.len(), vs.len(), cells_u, cells_v),
+        faces,
         ..Mesh::default()
     };
     let mut fields = ["H", "K", "k1", "k2"]
         .map(|name| Field { name: name.to_owned(), values: Vec::with_capacity(jets.len()) });
     for (k, jet) in jets.iter().enumerate() {
-        let (u, v) = (us[k / vs.len()], vs[k % vs.len()]);
+        let [u, v] = at(k);
         let measured =
             measure(jet).or_else(|| measure(&surface.jet(inwards(ku, u), inwards(kv, v), 2)));
         let (normal, values) = measured.unwrap_or_default();

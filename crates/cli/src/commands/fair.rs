@@ -253,10 +253,10 @@ fn content_for(
 ) -> Model {
     let unit = unit.clone();
     if let Some(splines) = splines.filter(|_| is_spline_file(path)) {
-        let named = splines.surfaces.iter().map(|(face, surface)| NamedSurface {
-            name: format!("patch {}", face.0),
-            surface: surface.clone(),
-        });
+        let named = splines
+            .surfaces
+            .iter()
+            .map(|(face, surface)| NamedSurface::new(format!("patch {}", face.0), surface.clone()));
         return Model { unit, surfaces: named.collect(), ..Model::default() };
     }
     match exchange::extension_of(path).as_str() {

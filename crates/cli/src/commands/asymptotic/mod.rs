@@ -122,7 +122,7 @@ fn surfaces(result: &Solution) -> Result<Vec<NamedSurface>, Failure> {
             KnotVector::clamped_uniform(degree, patch.degree() + 1).map_err(Failure::other)?;
         let surface = BsplineSurface::new(knots.clone(), knots, patch.points().to_vec(), None)
             .map_err(Failure::other)?;
-        surfaces.push(NamedSurface { name: format!("patch {f}"), surface });
+        surfaces.push(NamedSurface::new(format!("patch {f}"), surface));
     }
     Ok(surfaces)
 }
