@@ -1,7 +1,8 @@
 //! `cargo xtask judges`: written files read again by independent programs.
 //!
 //! Open CASCADE evaluates every face of a STEP file on a grid of parameters; points, Gaussian and
-//! mean curvature must agree with our own evaluation of the same file. geomdl does the same with
+//! mean curvature and the areas of faces must agree with our own evaluation of the same file, which
+//! it must find to be one valid shell. geomdl does the same with
 //! points and derivatives of its own format. The glTF validator must find no error in a GLB file.
 //! What is not installed is skipped by name.
 
@@ -14,6 +15,8 @@ use std::process::Command;
 /// Largest difference of points (times the size of the surface) and of curvatures (times their
 /// largest size on the face) that counts as agreement.
 const AGREEMENT: f64 = 1e-8;
+/// Largest relative difference of the areas of a face that counts as agreement.
+const AREA_AGREEMENT: f64 = 1e-6;
 /// Samples per direction of every face, both ends included.
 const SAMPLES: usize = 9;
 
@@ -22,11 +25,14 @@ const SAMPLES: usize = 9;
 struct Verdict {
     roots: usize,
     valid: bool,
+    shells: usize,
     faces: Vec<Face>,
 }
 
 #[derive(Deserialize)]
 struct Face {
+    /// Square millimetres.
+    area: f64,
     domain: [f64; 4],
     /// u, v, x, y, z, K, H; millimetres.
     samples: Vec<[f64; 7]>,
@@ -279,6 +285,15 @@ fn judge_step(python: &Path, file: &Path, asymptotic: bool) -> Outcome<String> {
     let mut worst = Differences::default();
     for (face, named) in verdict.faces.iter().zip(&model.surfaces) {
         worst.merge(&compare(face, &named.surface, scale, asymptotic)?);
+        let ours = named.curvature_statistics().area * scale * scale;
+        // Written so that NaN is a disagreement.
+        if !((face.area / ours - 1.0).abs() <= AREA_AGREEMENT) {
+            return Err(format!("an area of {}, we measure {ours}", face.area));
+        }
+    }
+    // All cases are surfaces in one piece.
+    if verdict.shells != 1 {
+        return Err(format!("Open CASCADE finds {} shells, one was expected", verdict.shells));
     }
     worst.check(verdict.faces.len())
 }
