@@ -54,7 +54,7 @@ pub use obj::{read_obj, write_obj, write_obj_and_materials};
 pub use off::read_off;
 pub use ply::{read_ply, write_ply};
 pub use ron_text::{from_ron, read_ron, to_ron};
-pub use sample::{face_mesh, surface_mesh};
+pub use sample::{face_mesh, joined_mesh, surface_mesh};
 pub use scene::{read_scene, write_scene};
 pub use segments::{Segment, write_segments_csv, write_segments_dxf};
 pub use step::{read_step, write_step};

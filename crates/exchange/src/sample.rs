@@ -39,6 +39,30 @@ pub fn face_mesh(face: &NamedSurface, cells: Option<(usize, usize)>) -> Mesh {
     with_curvatures(&face.name, &face.surface, &jets, |k| made.parameters[k], faces)
 }
 
+/// The meshes of [`face_mesh`] of several faces as one.
+#[must_use]
+pub fn joined_mesh<'a>(name: &str, faces: impl IntoIterator<Item = &'a NamedSurface>) -> Mesh {
+    let mut all = Mesh { name: name.to_owned(), ..Mesh::default() };
+    for face in faces {
+        let mesh = face_mesh(face, None);
+        let first = all.positions.len() as u32;
+        for corners in mesh.faces.iter() {
+            let moved: Vec<u32> = corners.iter().map(|i| first + i).collect();
+            all.faces.push(&moved);
+        }
+        all.positions.extend(mesh.positions);
+        all.normals.extend(mesh.normals);
+        if all.vertex_fields.is_empty() {
+            all.vertex_fields = mesh.vertex_fields;
+        } else {
+            for (field, more) in all.vertex_fields.iter_mut().zip(mesh.vertex_fields) {
+                field.values.extend(more.values);
+            }
+        }
+    }
+    all
+}
+
 /// The mesh over jets at parameters, with normals and curvatures.
 fn with_curvatures(
     name: &str,
@@ -100,4 +124,37 @@ fn grid_faces(n_u: usize, n_v: usize, cells_u: usize, cells_v: usize) -> IndexLi
         }
     }
     faces
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use bspline::{BsplineCurve, Degree, Trim, TrimCurve, TrimLoop};
+    use geom_core::{DVec3, assert_close};
+
+    #[test]
+    fn only_the_part_that_counts_is_sampled() {
+        let line = || KnotVector::clamped_uniform(Degree::new(1).unwrap(), 2).unwrap();
+        let corners = vec![DVec3::ZERO, DVec3::Y, DVec3::X, DVec3::new(1.0, 1.0, 0.0)];
+        let square = BsplineSurface::new(line(), line(), corners, None).unwrap();
+        let at = [(0.0, 0.0), (1.0, 0.0), (0.0, 1.0)].map(|(u, v)| DVec3::new(u, v, 0.0));
+        let side = |k: usize| TrimCurve {
+            parameters: BsplineCurve::segment(at[k], at[(k + 1) % 3], 0.0, 1.0).unwrap(),
+            edge: None,
+        };
+        let triangle = TrimLoop::new((0..3).map(side).collect(), 0.0).unwrap();
+        let whole = NamedSurface::new("whole", square);
+        let half = NamedSurface { trim: Some(Trim::new(vec![triangle]).unwrap()), ..whole.clone() };
+        let area = |mesh: &Mesh| -> f64 {
+            let faces = mesh.faces.iter().map(|f| {
+                let p = |k: usize| mesh.positions[f[k] as usize] - mesh.positions[f[0] as usize];
+                (2..f.len()).map(|k| 0.5 * p(k - 1).cross(p(k)).z).sum::<f64>()
+            });
+            faces.sum()
+        };
+        assert_close(area(&face_mesh(&half, Some((5, 7)))), 0.5, 1e-12);
+        let both = joined_mesh("both", [&whole, &half]);
+        assert_close(area(&both), 1.5, 1e-12);
+        assert!(both.vertex_fields.iter().all(|f| f.values.len() == both.positions.len()));
+    }
 }

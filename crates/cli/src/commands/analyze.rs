@@ -84,7 +84,7 @@ fn measure(path: &Path, model: &Model, rings: Option<usize>) -> Result<Measured,
     let (mut subdivision, mut warnings) = (None, Vec::new());
     if !model.surfaces.is_empty() {
         for named in &model.surfaces {
-            statistics.merge(&named.surface.curvature_statistics());
+            statistics.merge(&named.curvature_statistics());
         }
         let rational = model.surfaces.iter().any(|named| named.surface.is_rational());
         let kind = if rational { "rational_bspline_surface" } else { "bspline_surface" };
