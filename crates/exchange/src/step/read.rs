@@ -256,8 +256,9 @@ impl<'a> Reader<'_, 'a> {
         }
         path.push(group);
         for k in self.tree.members(group).collect::<Vec<_>>() {
+            let name = self.tree.name(group).unwrap_or_default().to_owned();
             for owned in self.faces_of(k)?.iter() {
-                self.push(owned, map, out)?;
+                self.push(owned, map, &name, out)?;
             }
             for id in self.tree.representations()[k].items.clone() {
                 if self.file.keyword(id) != b"MAPPED_ITEM" {
@@ -278,11 +279,12 @@ impl<'a> Reader<'_, 'a> {
         Ok(())
     }
 
-    /// One face in its place.
+    /// One face in its place, under the name of the part if it has none of its own.
     fn push(
         &mut self,
         owned: &Owned,
         map: DAffine3,
+        part: &str,
         out: &mut Vec<NamedSurface>,
     ) -> Result<(), ReadError> {
         let Face { name, surface, trim } = &owned.face;
@@ -306,7 +308,8 @@ impl<'a> Reader<'_, 'a> {
                 (surface, trim) = (surface.swapped(), trim.map(|t| t.swapped()));
             }
         }
-        out.push(NamedSurface { name: name.clone(), surface, trim, color: owned.color });
+        let name = if name.is_empty() { part.to_owned() } else { name.clone() };
+        out.push(NamedSurface { name, surface, trim, color: owned.color });
         Ok(())
     }
 
@@ -349,7 +352,7 @@ impl<'a> Reader<'_, 'a> {
                 self.item(instance.id, context, &inherited, 0, &mut whole, &mut found)?;
             }
         }
-        found.iter().try_for_each(|owned| self.push(owned, DAffine3::IDENTITY, out))
+        found.iter().try_for_each(|owned| self.push(owned, DAffine3::IDENTITY, "", out))
     }
 
     /// An item of a representation and all below it.

@@ -31,6 +31,8 @@ pub(super) struct Tree {
     by_id: HashMap<u64, usize>,
     children: HashMap<usize, Vec<Placed>>,
     is_child: HashSet<usize>,
+    /// Names of the products that groups are the shapes of, where there are several products.
+    names: HashMap<usize, String>,
     /// Whether every unit is the same; if not, which there are.
     pub(super) units: Vec<String>,
 }
@@ -153,6 +155,14 @@ impl Tree {
         for k in 0..self.all.len() {
             self.all[k].group = self.root(k);
         }
+        let named = definitions.iter().filter_map(|(definition, shape)| {
+            let group = self.all[*self.by_id.get(shape)?].group;
+            Some((group, product_name(file, *definition)?))
+        });
+        let names: HashMap<usize, String> = named.collect();
+        if names.len() > 1 {
+            self.names = names;
+        }
         let parts: HashMap<u64, u64> = usages.iter().copied().collect();
         for (id, relation) in relations {
             let Some(operator) = relation.operator else { continue };
@@ -248,6 +258,11 @@ impl Tree {
         Ok(Some((self.all[shown].group, map)))
     }
 
+    /// The name of the product that a group is the shape of, in a file of several.
+    pub(super) fn name(&self, group: usize) -> Option<&str> {
+        self.names.get(&group).map(String::as_str)
+    }
+
     /// Marks the group of a representation as part of another.
     pub(super) fn mark_mapped(&mut self, group: usize) {
         self.is_child.insert(group);
@@ -314,6 +329,29 @@ fn product_of(file: &StepFile<'_>, id: u64, from: &Cursor<'_>) -> Result<Option<
     let mut cursor = file.record(id, "PRODUCT_DEFINITION_SHAPE", from)?;
     cursor.skip_arguments(2)?;
     cursor.optional_reference()
+}
+
+/// The name of a product by its definition; nothing depends on it, so that faults do not matter.
+fn product_name(file: &StepFile<'_>, definition: u64) -> Option<String> {
+    if !file.keyword(definition).starts_with(b"PRODUCT_DEFINITION") {
+        return None;
+    }
+    let record = |id: u64| {
+        let body = file.index.at(file.instance(id)?);
+        body.record(&String::from_utf8_lossy(file.keyword(id)))
+    };
+    let mut id = definition;
+    // From the definition to its formation, and on to the product.
+    for _ in 0..2 {
+        let mut cursor = record(id)?;
+        cursor.skip_arguments(2).ok()?;
+        id = cursor.reference().ok()?;
+    }
+    let mut cursor = record(id).filter(|_| file.keyword(id) == b"PRODUCT")?;
+    let number = cursor.string().ok()?;
+    cursor.comma().ok()?;
+    let name = cursor.string().ok()?;
+    [name, number].into_iter().find(|text| !text.is_empty())
 }
 
 /// The product definition that a usage puts into another, by the shape of the usage.

@@ -64,7 +64,7 @@ impl Writer {
         let _ = write!(
             self.text,
             "ISO-10303-21;\nHEADER;\nFILE_DESCRIPTION((''),'2;1');\n\
-             FILE_NAME({name},'2000-01-01T00:00:00',(''),(''),'umbilic','umbilic','');\n\
+             FILE_NAME({name},'2000-01-01T00:00:00',(''),(''),'Umbilic','Umbilic','');\n\
              FILE_SCHEMA(('AUTOMOTIVE_DESIGN {{ 1 0 10303 214 1 1 1 1 }}'));\nENDSEC;\nDATA;\n"
         );
         let application = self.add("APPLICATION_CONTEXT('automotive design')");
