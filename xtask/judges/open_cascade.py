@@ -2,26 +2,32 @@
 
 usage: open_cascade.py FILE [SAMPLES]
 
-Prints {"roots": n, "valid": bool, "shells": n, "edges": n, "faces": [{"area": ..,
-"domain": [u0, u1, v0, v1], "samples": [[u, v, x, y, z, K, H], ..]}]}; the grid includes both ends
-of both parameters.
+Prints {"roots": n, "valid": bool, "solids": n, "shells": n, "edges": n, "open_edges": n,
+"volume": .., "box": [x0, y0, z0, x1, y1, z1], "faces": [{"area": .., "domain": [u0, u1, v0, v1],
+"samples": [[u, v, x, y, z, K, H], ..]}]}; the grid includes both ends of both parameters. Edges
+without length are not counted; open ones have one face.
 Lengths are millimetres, as Open CASCADE converts them.
 """
 
 import json
 import sys
 
+from OCP.Bnd import Bnd_Box
 from OCP.BRep import BRep_Tool
+from OCP.BRepBndLib import BRepBndLib
 from OCP.BRepCheck import BRepCheck_Analyzer
 from OCP.BRepGProp import BRepGProp
 from OCP.GeomLProp import GeomLProp_SLProps
 from OCP.GProp import GProp_GProps
 from OCP.IFSelect import IFSelect_RetDone
 from OCP.STEPControl import STEPControl_Reader
-from OCP.TopAbs import TopAbs_EDGE, TopAbs_FACE, TopAbs_SHELL
+from OCP.TopAbs import TopAbs_EDGE, TopAbs_FACE, TopAbs_SHELL, TopAbs_SOLID
 from OCP.TopExp import TopExp, TopExp_Explorer
 from OCP.TopoDS import TopoDS
-from OCP.TopTools import TopTools_IndexedMapOfShape
+from OCP.TopTools import (
+    TopTools_IndexedDataMapOfShapeListOfShape,
+    TopTools_IndexedMapOfShape,
+)
 
 
 def samples_of(surface, count):
@@ -49,6 +55,31 @@ def count(shape, kind):
     return found.Extent()
 
 
+def edges_by_faces(shape):
+    """Numbers of edges with length, and of those among them with one face."""
+    faces_of = TopTools_IndexedDataMapOfShapeListOfShape()
+    TopExp.MapShapesAndAncestors_s(shape, TopAbs_EDGE, TopAbs_FACE, faces_of)
+    edges, open_edges = 0, 0
+    for k in range(1, faces_of.Extent() + 1):
+        if not BRep_Tool.Degenerated_s(TopoDS.Edge_s(faces_of.FindKey(k))):
+            edges += 1
+            open_edges += faces_of.FindFromIndex(k).Size() == 1
+    return edges, open_edges
+
+
+def volume_of(shape):
+    properties = GProp_GProps()
+    BRepGProp.VolumeProperties_s(shape, properties, 1e-9)
+    return properties.Mass()
+
+
+def box_of(shape):
+    box = Bnd_Box()
+    BRepBndLib.AddOptimal_s(shape, box, False, False)
+    low, high = box.CornerMin(), box.CornerMax()
+    return [low.X(), low.Y(), low.Z(), high.X(), high.Y(), high.Z()]
+
+
 def area_of(face):
     properties = GProp_GProps()
     BRepGProp.SurfaceProperties_s(face, properties, 1e-9)
@@ -70,8 +101,18 @@ def main():
         faces.append({"area": area_of(face), "domain": domain, "samples": found})
         explorer.Next()
     valid = BRepCheck_Analyzer(shape).IsValid()
-    shells, edges = count(shape, TopAbs_SHELL), count(shape, TopAbs_EDGE)
-    found = {"roots": roots, "valid": valid, "shells": shells, "edges": edges, "faces": faces}
+    edges, open_edges = edges_by_faces(shape)
+    found = {
+        "roots": roots,
+        "valid": valid,
+        "solids": count(shape, TopAbs_SOLID),
+        "shells": count(shape, TopAbs_SHELL),
+        "edges": edges,
+        "open_edges": open_edges,
+        "volume": volume_of(shape) if count(shape, TopAbs_SOLID) > 0 else 0.0,
+        "box": box_of(shape),
+        "faces": faces,
+    }
     json.dump(found, sys.stdout)
 
 

@@ -9,13 +9,13 @@ mod commands;
 mod config;
 mod context;
 mod failure;
+mod input_file;
 mod net_files;
 mod net_report;
 mod option_flags;
 mod outcome;
 mod panel_files;
 mod report_support;
-mod surface_file;
 mod watch;
 
 use clap::{CommandFactory, Parser};

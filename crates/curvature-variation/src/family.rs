@@ -163,6 +163,7 @@ pub(crate) fn solve(
         metrics,
         extrapolated,
         warnings,
+        clamps: meter.clamps,
         report: RunReport { status, ..RunReport::of_stages(stages) },
     })
 }

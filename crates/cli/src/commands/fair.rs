@@ -3,6 +3,7 @@
 use crate::args::{CheckpointArgs, ConfigArgs, ConvergedArgs, OutputArgs, ReportArgs};
 use crate::context::Context;
 use crate::failure::Failure;
+use crate::input_file::{self, PartArgs, SurfaceArgs};
 use crate::option_flags::{OptionFlags, list, refused};
 use crate::outcome::Outcome;
 use crate::report_support;
@@ -30,6 +31,8 @@ f1, f3, mehlum_tarrou, mehlum_tarrou(w1,w3), cross_curvature, average_derivative
 pub(crate) struct Fair {
     /// Control mesh of quads or n-gons; the surface is its Catmull-Clark limit
     input: PathBuf,
+    #[command(flatten)]
+    part: PartArgs,
     #[command(flatten)]
     output: OutputArgs,
     #[command(flatten)]
@@ -72,8 +75,7 @@ impl Fair {
                 "--family leaves no vertex to fix; drop --fix, --creases and --clamp-boundary",
             ));
         }
-        let model =
-            exchange::read_model(&self.input).map_err(|e| Failure::input(&self.input, e))?;
+        let model = input_file::read(&self.input, &SurfaceArgs::default(), &self.part)?;
         let input = self.read(&model)?;
         let mut watch = Watch::new(context, "fairing").with_checkpoints(&self.checkpoint)?;
         let mut result =
@@ -87,7 +89,7 @@ impl Fair {
             None => None,
         };
         if let Some(splines) = &splines {
-            result.metrics.add_splines(splines);
+            result.add_splines(splines);
         }
         let mut outcome = Outcome::new(result.report.status, result.report.iterations)
             .with_input(&self.input)
@@ -95,16 +97,12 @@ impl Fair {
         watch.finish(&mut outcome)?;
         outcome.summary = summary(&result, &options);
         outcome.warnings.clone_from(&model.warnings);
-        let fitted = splines.as_ref().and_then(|s| s.warning(&result.result));
-        let warnings = fitted.iter().chain(&result.warnings);
-        outcome.warnings.extend(warnings.map(ToString::to_string));
+        outcome.warnings.extend(result.warnings.iter().map(ToString::to_string));
         outcome.summary.extend(splines.as_ref().map(spline_summary));
         outcome.require_converged = self.converged.require_converged;
         for path in self.output.output {
             let content = content_for(&path, &result, splines.as_ref(), &model.unit);
-            let bytes =
-                exchange::encode_model(&path, &content).map_err(|e| Failure::input(&path, e))?;
-            outcome.files.push((path, bytes));
+            outcome.add_model(path, &content)?;
         }
         if self.report.wanted() {
             let mut page = report_support::new("Fairing of a subdivision surface");
@@ -155,19 +153,13 @@ struct SymmetryFile {
 }
 
 fn read_control_mesh(path: &Path, model: &Model) -> Result<geom_core::PolyMesh, Failure> {
-    let mut meshes = model.meshes.iter().filter(|m| !m.faces.is_empty());
-    match (meshes.next(), meshes.next()) {
-        (Some(mesh), None) => mesh.to_poly_mesh().map_err(|e| Failure::input(path, e)),
-        (None, _) => Err(Failure::input(path, "there is no mesh in this file; give a quad mesh")),
-        (Some(_), Some(_)) => {
-            Err(Failure::input(path, "there are several meshes in this file; leave one of them in"))
-        }
-    }
+    let mesh = input_file::only_mesh(path, model)?;
+    mesh.to_poly_mesh().map_err(|e| Failure::input(path, e))
 }
 
 /// A further mesh of `--family`.
 fn read_member(path: &Path) -> Result<geom_core::PolyMesh, Failure> {
-    let model = exchange::read_model(path).map_err(|e| Failure::input(path, e))?;
+    let model = input_file::read(path, &SurfaceArgs::default(), &PartArgs::default())?;
     read_control_mesh(path, &model)
 }
 
