@@ -239,6 +239,9 @@ impl BsplineCurve {
     /// # Errors
     /// [`SplineError`] if the numbers of an extreme curve leave the range of `f64`.
     pub fn clamped(&self) -> Result<Self, SplineError> {
+        if self.knots().is_clamped() {
+            return Ok(self.clone());
+        }
         self.expressed(&self.knots().clamped())
     }
 
@@ -315,6 +318,9 @@ impl BsplineSurface {
     /// # Errors
     /// [`SplineError`] if the numbers of an extreme surface leave the range of `f64`.
     pub fn clamped(&self) -> Result<Self, SplineError> {
+        if self.knots_u().is_clamped() && self.knots_v().is_clamped() {
+            return Ok(self.clone());
+        }
         self.expressed(&self.knots_u().clamped(), &self.knots_v().clamped())
     }
 

@@ -10,6 +10,7 @@ mod commands;
 mod config;
 mod context;
 mod failure;
+mod input_file;
 mod interrupt;
 mod net_files;
 mod net_report;
@@ -17,7 +18,6 @@ mod option_flags;
 mod outcome;
 mod panel_files;
 mod report_support;
-mod surface_file;
 mod watch;
 
 use clap::{CommandFactory, Parser};

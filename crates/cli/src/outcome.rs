@@ -1,6 +1,7 @@
 //! What a command hands back: files still in memory, numbers, and a summary.
 
 use crate::failure::Failure;
+use exchange::Model;
 use serde::Serialize;
 use std::path::{Path, PathBuf};
 
@@ -55,6 +56,18 @@ impl Outcome {
     pub(crate) fn with_metrics<T: Serialize>(mut self, metrics: &T) -> Result<Self, Failure> {
         self.metrics = serde_json::to_value(metrics).map_err(Failure::other)?;
         Ok(self)
+    }
+
+    /// Adds a file with this content; the extension chooses the format.
+    pub(crate) fn add_model(&mut self, path: PathBuf, model: &Model) -> Result<(), Failure> {
+        let bytes = exchange::encode_model(&path, model).map_err(|e| Failure::input(&path, e))?;
+        if let Some(lost) = model.unit.lost_in(&exchange::extension_of(&path))
+            && !self.warnings.contains(&lost)
+        {
+            self.warnings.push(lost);
+        }
+        self.files.push((path, bytes));
+        Ok(())
     }
 
     /// The bytes of the metrics file.

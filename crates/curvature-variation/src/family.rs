@@ -170,6 +170,7 @@ pub(crate) fn solve(
         metrics,
         extrapolated,
         warnings,
+        clamps: meter.clamps,
         report: RunReport { status, ..RunReport::of_stages(stages) },
     })
 }

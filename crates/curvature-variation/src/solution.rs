@@ -49,6 +49,8 @@ pub struct Solution {
     /// pulls of [`crate::Constraints::weights`]. The status is `Stalled` in place of `Converged` if
     /// the quadrature gap is above 1 %.
     pub report: RunReport,
+    /// Whether the quads at the boundary are left out of the energies.
+    pub(crate) clamps: bool,
     /// What every level was made of.
     pub levels: Vec<LevelNumbers>,
 }

@@ -230,5 +230,6 @@ fn fair(
         warnings,
         report: RunReport { status, ..RunReport::of_stages(stages) },
         levels: numbers,
+        clamps: meter(input, options).clamps,
     })
 }

@@ -29,6 +29,9 @@ pub enum Error {
     /// Not enough samples to see the surface.
     #[error("{found} samples in {direction} are too few; ask for at least {needed}")]
     TooFewSamples { direction: &'static str, found: usize, needed: usize },
+    /// A trim without a sample in it.
+    #[error("no sample lies within the trim of the surface; ask for more `samples`")]
+    NothingInside,
     /// More samples or control points than could ever be wanted.
     #[error("{count} {what} are more than the {limit} that are supported; ask for fewer")]
     TooMany { what: &'static str, count: usize, limit: usize },

@@ -1,10 +1,11 @@
 //! How Weingarten a surface is, and how far it has moved.
 
-use bspline::BsplineSurface;
+use bspline::{BsplineSurface, Trim, TrimLoop};
 use geom_core::BoundingBox;
 
 use crate::field::{Sample, samples};
 use crate::grid::SampleGrid;
+use crate::input::Input;
 use crate::locus::RelationLocus;
 use crate::target::Target;
 use crate::variables::coordinates;
@@ -33,7 +34,7 @@ pub struct Metrics {
     /// gradients: `√(Σ J²/Δ / Σ |∇_s H|² |∇_s K|²)` with `J = H_u K_v − H_v K_u`. 0 where `H` or
     /// `K` is constant.
     pub alignment_rms: f64,
-    /// Integral of `|J|` over the parameter domain, over `range H · range K`: the area the
+    /// Integral of `|J|` over the parameter domain (within the trim), over `range H · range K`: the area the
     /// curvature diagram sweeps in units of its box. 0 where `H` or `K` is constant to 1e-9 of
     /// its size.
     pub diagram_area: f64,
@@ -59,6 +60,7 @@ pub struct Metrics {
 /// Measures surfaces against the input they come from.
 pub(crate) struct Meter<'a> {
     input: &'a BsplineSurface,
+    trim: Option<&'a Trim>,
     samples: [usize; 2],
     unit: f64,
 }
@@ -68,14 +70,14 @@ pub(crate) type ScaledTarget<'t> = Option<&'t Target>;
 
 impl<'a> Meter<'a> {
     /// `samples` are those of the optimiser, `unit` its working scale.
-    pub(crate) fn new(input: &'a BsplineSurface, samples: [usize; 2], unit: f64) -> Self {
-        Self { input, samples, unit }
+    pub(crate) fn new(input: Input<'a>, samples: [usize; 2], unit: f64) -> Self {
+        Self { input: input.surface, trim: input.trim, samples, unit }
     }
 
     /// The metrics of `surface`.
     pub(crate) fn measure(&self, surface: &BsplineSurface, target: ScaledTarget<'_>) -> Metrics {
         let fine = self.samples.map(|m| 2 * m);
-        let grid = SampleGrid::midpoints(surface, fine);
+        let grid = SampleGrid::midpoints(surface, fine).within(self.trim, surface);
         let here = samples(&grid, &coordinates(surface));
         let diagonal = BoundingBox::of(self.input.control_points().iter().copied())
             .map_or(1.0, BoundingBox::diagonal);
@@ -86,7 +88,8 @@ impl<'a> Meter<'a> {
                 .fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), x| (l.min(x), h.max(x)))
         };
         let (h, k) = (range(|s| s.jet.h), range(|s| s.jet.k));
-        let (alignment_rms, diagram_area) = self.alignment(surface, &here, diagonal, h, k);
+        let (alignment_rms, diagram_area) =
+            self.alignment(surface, &here, grid.len(), diagonal, h, k);
         Metrics {
             alignment_rms,
             diagram_area,
@@ -103,7 +106,7 @@ impl<'a> Meter<'a> {
 
     /// Where the relation holds in the diagram, fitted to `surface` if it is one to fit.
     pub(crate) fn locus(&self, surface: &BsplineSurface, target: &Target) -> RelationLocus {
-        let grid = SampleGrid::midpoints(surface, self.samples);
+        let grid = SampleGrid::midpoints(surface, self.samples).within(self.trim, surface);
         target.locus(&rescaled(samples(&grid, &coordinates(surface)), self.unit))
     }
 
@@ -111,6 +114,7 @@ impl<'a> Meter<'a> {
         &self,
         surface: &BsplineSurface,
         here: &[Sample],
+        cells: usize,
         diagonal: f64,
         h: (f64, f64),
         k: (f64, f64),
@@ -131,12 +135,12 @@ impl<'a> Meter<'a> {
             area += j.abs();
         }
         let (u, v) = (surface.knots_u().domain(), surface.knots_v().domain());
-        let cell = (u.1 - u.0) * (v.1 - v.0) / here.len() as f64;
+        let cell = (u.1 - u.0) * (v.1 - v.0) / cells as f64;
         let alignment = if weight > 0.0 { (sine / weight).sqrt() } else { 0.0 };
         (alignment, area * cell / (range_h * range_k))
     }
 
-    /// Largest distance along the open sides, at midpoints and corners.
+    /// Largest distance along the open sides, at midpoints and corners, or along the trim.
     fn border_deviation(&self, surface: &BsplineSurface, fine: [usize; 2]) -> f64 {
         let (ku, kv) = (surface.knots_u(), surface.knots_v());
         let with_ends = |knots: &bspline::KnotVector, m: usize| {
@@ -148,6 +152,11 @@ impl<'a> Meter<'a> {
         };
         let (u, v) = (with_ends(ku, fine[0]), with_ends(kv, fine[1]));
         let mut pairs = Vec::new();
+        if let Some(trim) = self.trim {
+            let places = trim.loops().iter().flat_map(TrimLoop::polygon);
+            pairs.extend(places.map(|p| [p.x, p.y]));
+            return self.largest_deviation(surface, &pairs);
+        }
         if !kv.is_periodic() {
             let (start, end) = kv.domain();
             pairs.extend(u.iter().flat_map(|&u| [[u, start], [u, end]]));
@@ -156,8 +165,12 @@ impl<'a> Meter<'a> {
             let (start, end) = ku.domain();
             pairs.extend(v.iter().flat_map(|&v| [[start, v], [end, v]]));
         }
-        let here = surface.jets(&pairs, 0);
-        let there = self.input.jets(&pairs, 0);
+        self.largest_deviation(surface, &pairs)
+    }
+
+    fn largest_deviation(&self, surface: &BsplineSurface, pairs: &[[f64; 2]]) -> f64 {
+        let here = surface.jets(pairs, 0);
+        let there = self.input.jets(pairs, 0);
         let distance = |(a, b): (&geom_core::SurfaceJet, &geom_core::SurfaceJet)| {
             a.position().distance(b.position())
         };
@@ -169,8 +182,8 @@ impl<'a> Meter<'a> {
 fn deviation(input: &BsplineSurface, grid: &SampleGrid, here: &[Sample]) -> (f64, f64) {
     let there = input.point_grid(&grid.u.parameters, &grid.v.parameters);
     let (mut sum, mut max) = (0.0, 0.0f64);
-    for (s, p) in here.iter().zip(&there) {
-        let d = s.point.distance(*p);
+    for (k, s) in here.iter().enumerate() {
+        let d = s.point.distance(there[grid.place(k)]);
         sum += d;
         max = max.max(d);
     }

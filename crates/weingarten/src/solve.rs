@@ -9,6 +9,7 @@ use gp_solver::{
 };
 
 use crate::error::Error;
+use crate::input::Input;
 use crate::level::Level;
 use crate::locus::RelationLocus;
 use crate::metrics::{Meter, Metrics};
@@ -54,7 +55,8 @@ pub struct Solution {
     pub samples: [usize; 2],
 }
 
-/// Optimises `surface` towards a Weingarten surface near to it.
+/// Optimises a surface (`&BsplineSurface`, or an [`Input`]) towards a Weingarten surface near to
+/// it.
 ///
 /// # Errors
 /// [`Error`] for what cannot be attempted. Not converging is a [`Status`] of the report.
@@ -75,12 +77,12 @@ pub struct Solution {
 /// assert!(solution.metrics.alignment_rms < 0.1 * solution.before.alignment_rms);
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
-pub fn solve(
-    surface: &BsplineSurface,
+pub fn solve<'a>(
+    input: impl Into<Input<'a>>,
     options: &Options,
     observer: &mut dyn Observer,
 ) -> Result<Solution, Error> {
-    solve_with(surface, options, &mut |_, _, _| Ok(()), observer)
+    solve_with(input, options, &mut |_, _, _| Ok(()), observer)
 }
 
 /// As [`solve`], with blocks of one's own: `extra` is called whenever a level has built its problem
@@ -106,14 +108,15 @@ pub fn solve(
 /// assert!(moved < 1e-12);
 /// # Ok::<(), weingarten::Error>(())
 /// ```
-pub fn solve_with(
-    surface: &BsplineSurface,
+pub fn solve_with<'a>(
+    input: impl Into<Input<'a>>,
     options: &Options,
     extra: &mut Extra<'_, Error>,
     observer: &mut dyn Observer,
 ) -> Result<Solution, Error> {
-    let schedule = Schedule::new(surface, options)?;
-    let fingerprint = fingerprint(surface, options);
+    let input = input.into();
+    let schedule = Schedule::new(input, options)?;
+    let fingerprint = fingerprint(input, options);
     let resume = observer.resume();
     if let Some(checkpoint) = &resume {
         checkpoint.check(METHOD, fingerprint)?;
@@ -155,7 +158,7 @@ pub fn solve_with(
         return Err(gp_solver::SolverError::ForeignCheckpoint { what }.into());
     };
     let report = RunReport { iterations: steps, ..RunReport::of_stages(stages) };
-    finish(surface, options, &level, &start, &working, report)
+    finish(input, options, &level, &start, &working, report)
 }
 
 /// The problem of the first level, at its start.
@@ -172,15 +175,18 @@ pub fn solve_with(
 /// assert!(problem.blocks().any(|(_, name)| name == "alignment"));
 /// # Ok::<(), weingarten::Error>(())
 /// ```
-pub fn problem(surface: &BsplineSurface, options: &Options) -> Result<Problem<'static>, Error> {
-    let level = Schedule::new(surface, options)?.level(0)?;
+pub fn problem<'a>(
+    input: impl Into<Input<'a>>,
+    options: &Options,
+) -> Result<Problem<'static>, Error> {
+    let level = Schedule::new(input.into(), options)?.level(0)?;
     let origin = coordinates(&level.reference);
     Ok(prepared(&level, options, &origin, &mut |_, _, _| Ok(()))?.problem)
 }
 
 /// Back to the model's units, measured and put together.
 fn finish(
-    input: &BsplineSurface,
+    input: Input<'_>,
     options: &Options,
     level: &Level,
     start: &SampledSurface,
@@ -189,12 +195,13 @@ fn finish(
 ) -> Result<Solution, Error> {
     // A net nothing has moved is the input itself, to the last bit.
     let is_input = report.iterations == 0 && options.levels.is_empty() && options.moves.is_empty();
-    let result = if is_input { input.clone() } else { scaled(working, 1.0 / level.stage.unit)? };
+    let result =
+        if is_input { input.surface.clone() } else { scaled(working, 1.0 / level.stage.unit)? };
     let target = level.target(options, start);
     let samples = [level.grid.u.len(), level.grid.v.len()];
     let meter = Meter::new(input, samples, level.stage.unit);
     Ok(Solution {
-        before: meter.measure(input, target.as_ref()),
+        before: meter.measure(input.surface, target.as_ref()),
         metrics: meter.measure(&result, target.as_ref()),
         relation: target.as_ref().map(|target| meter.locus(&result, target)),
         report,
@@ -204,7 +211,8 @@ fn finish(
 }
 
 /// Of everything a run depends on. More steps are no other run: a finished one may be taken further.
-fn fingerprint(surface: &BsplineSurface, options: &Options) -> u64 {
+fn fingerprint(input: Input<'_>, options: &Options) -> u64 {
+    let surface = input.surface;
     let mut of = Fingerprint::new();
     for point in surface.control_points() {
         of = of.numbers(&point.to_array());
@@ -213,6 +221,15 @@ fn fingerprint(surface: &BsplineSurface, options: &Options) -> u64 {
     of = of.numbers(surface.knots_u().knots()).numbers(surface.knots_v().knots());
     if let Some(weights) = surface.weights() {
         of = of.numbers(weights);
+    }
+    for made in input.trim.iter().flat_map(|trim| trim.loops()) {
+        for curve in made.curves().iter().map(|c| &c.parameters) {
+            of = of.numbers(curve.knots().knots());
+            for point in curve.control_points() {
+                of = of.numbers(&point.to_array());
+            }
+            of = of.numbers(curve.weights().unwrap_or_default());
+        }
     }
     let options = Options { iterations: 0, ..options.clone() };
     of.text(&format!("{options:?}")).finish()

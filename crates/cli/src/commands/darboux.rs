@@ -3,6 +3,7 @@
 use crate::args::{ConfigArgs, ConvergedArgs, OutputArgs, ReportArgs};
 use crate::context::Context;
 use crate::failure::Failure;
+use crate::input_file::PartArgs;
 use crate::net_files::{self, NetInput};
 use crate::net_report;
 use crate::option_flags::{OptionFlags, in_flags};
@@ -27,6 +28,8 @@ use std::path::{Path, PathBuf};
 pub(crate) struct Darboux {
     /// Net file, or quads along asymptotic directions (solved first)
     input: PathBuf,
+    #[command(flatten)]
+    part: PartArgs,
     #[command(flatten)]
     output: OutputArgs,
     #[command(flatten)]
@@ -56,7 +59,7 @@ impl Darboux {
         net_files::check_outputs(&self.output.output, &["glb", "obj", "ply", "stl"])?;
         let options = self.options()?;
         let mut watch = Watch::new(context, "net").of(&self.input);
-        let (input, unit, mut warnings) = net_files::read(&self.input)?;
+        let (input, unit, mut warnings) = net_files::read(&self.input, &self.part)?;
         let (surface, status, steps) = match input {
             NetInput::Net(surface) => (*surface, Status::Converged, 0),
             NetInput::Mesh(mesh) => self.solve(&mesh, &mut watch, &mut warnings)?,
@@ -79,9 +82,7 @@ impl Darboux {
         for path in self.output.output {
             let mesh = net_files::sampled_mesh("Darboux transform", sampled);
             let model = Model::of_mesh(mesh, unit.clone());
-            let bytes =
-                exchange::encode_model(&path, &model).map_err(|e| Failure::input(&path, e))?;
-            outcome.files.push((path, bytes));
+            outcome.add_model(path, &model)?;
         }
         if self.report.wanted() {
             let mut page = net_report::page("Darboux transform", &self.input, &unit);

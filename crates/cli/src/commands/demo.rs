@@ -78,7 +78,7 @@ impl Demo {
         outcome.summary.extend(cut.summary());
 
         let unit = model.unit.to_string();
-        let mut report = weingarten_report(&named.surface, &solution, &options, &unit)?;
+        let mut report = weingarten_report(named, &solution, &options, &unit)?;
         cut.describe(&mut report)?;
         let result = Model::of_surface("roof", solution.result, model.unit.clone());
         for path in [step, glb] {

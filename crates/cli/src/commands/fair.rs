@@ -4,6 +4,7 @@ use crate::args::{ConfigArgs, ConvergedArgs, OutputArgs, ReportArgs};
 use crate::checkpoints::CheckpointArgs;
 use crate::context::Context;
 use crate::failure::Failure;
+use crate::input_file::{self, PartArgs, SurfaceArgs};
 use crate::option_flags::{OptionFlags, list, refused};
 use crate::outcome::Outcome;
 use crate::report_support;
@@ -32,6 +33,8 @@ f1, f3, mehlum_tarrou, mehlum_tarrou(w1,w3), cross_curvature, average_derivative
 pub(crate) struct Fair {
     /// Control mesh of quads or n-gons; the surface is its Catmull-Clark limit
     input: PathBuf,
+    #[command(flatten)]
+    part: PartArgs,
     #[command(flatten)]
     output: OutputArgs,
     #[command(flatten)]
@@ -76,8 +79,7 @@ impl Fair {
         }
         let mut watch =
             Watch::new(context, "fairing").of(&self.input).with_checkpoints(&self.checkpoint)?;
-        let model =
-            exchange::read_model(&self.input).map_err(|e| Failure::input(&self.input, e))?;
+        let model = input_file::read(&self.input, &SurfaceArgs::default(), &self.part)?;
         let input = self.read(&model)?;
         let mut result = solve(&input, &options, &mut watch).map_err(|e| match e {
             Error::Solver(e @ SolverError::ForeignCheckpoint { .. }) => watch.foreign(&e),
@@ -102,16 +104,15 @@ impl Fair {
             None => None,
         };
         if let Some(splines) = &splines {
-            result.metrics.add_splines(splines);
+            let before = result.warnings.len();
+            result.add_splines(splines);
             outcome = outcome.with_metrics(&result.metrics)?;
-            outcome.warnings.extend(splines.warning(&result.result).map(|w| w.to_string()));
+            outcome.warnings.extend(result.warnings[before..].iter().map(ToString::to_string));
             outcome.summary.push(spline_summary(splines));
         }
         for path in self.output.output {
             let content = content_for(&path, &result, splines.as_ref(), &model.unit);
-            let bytes =
-                exchange::encode_model(&path, &content).map_err(|e| Failure::input(&path, e))?;
-            outcome.files.push((path, bytes));
+            outcome.add_model(path, &content)?;
         }
         if self.report.wanted() {
             let mut page = report_support::new("Fairing of a subdivision surface");
@@ -162,19 +163,13 @@ struct SymmetryFile {
 }
 
 fn read_control_mesh(path: &Path, model: &Model) -> Result<geom_core::PolyMesh, Failure> {
-    let mut meshes = model.meshes.iter().filter(|m| !m.faces.is_empty());
-    match (meshes.next(), meshes.next()) {
-        (Some(mesh), None) => mesh.to_poly_mesh().map_err(|e| Failure::input(path, e)),
-        (None, _) => Err(Failure::input(path, "there is no mesh in this file; give a quad mesh")),
-        (Some(_), Some(_)) => {
-            Err(Failure::input(path, "there are several meshes in this file; leave one of them in"))
-        }
-    }
+    let mesh = input_file::only_mesh(path, model)?;
+    mesh.to_poly_mesh().map_err(|e| Failure::input(path, e))
 }
 
 /// A further mesh of `--family`.
 fn read_member(path: &Path) -> Result<geom_core::PolyMesh, Failure> {
-    let model = exchange::read_model(path).map_err(|e| Failure::input(path, e))?;
+    let model = input_file::read(path, &SurfaceArgs::default(), &PartArgs::default())?;
     read_control_mesh(path, &model)
 }
 
@@ -260,10 +255,10 @@ fn content_for(
 ) -> Model {
     let unit = unit.clone();
     if let Some(splines) = splines.filter(|_| is_spline_file(path)) {
-        let named = splines.surfaces.iter().map(|(face, surface)| NamedSurface {
-            name: format!("patch {}", face.0),
-            surface: surface.clone(),
-        });
+        let named = splines
+            .surfaces
+            .iter()
+            .map(|(face, surface)| NamedSurface::new(format!("patch {}", face.0), surface.clone()));
         return Model { unit, surfaces: named.collect(), ..Model::default() };
     }
     match exchange::extension_of(path).as_str() {

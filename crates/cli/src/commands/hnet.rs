@@ -4,6 +4,7 @@ use crate::args::{ConfigArgs, ConvergedArgs, OutputArgs, ReportArgs, SystemArgs}
 use crate::checkpoints::CheckpointArgs;
 use crate::context::Context;
 use crate::failure::Failure;
+use crate::input_file::PartArgs;
 use crate::net_files::{self, NetInput};
 use crate::net_report;
 use crate::option_flags::{self, OptionFlags};
@@ -23,6 +24,8 @@ use std::path::PathBuf;
 pub(crate) struct Hnet {
     /// Quads that follow the asymptotic directions of a negatively curved surface, or a net file
     input: PathBuf,
+    #[command(flatten)]
+    part: PartArgs,
     #[command(flatten)]
     output: OutputArgs,
     /// Mesh of the surface to stay near [default: the input itself]
@@ -53,14 +56,16 @@ impl Hnet {
             .of(&self.input)
             .with_checkpoints(&self.checkpoint)?
             .with_systems(self.system.dump_system.as_deref())?;
-        let (input, unit, mut warnings) = net_files::read(&self.input)?;
+        let (input, unit, mut warnings) = net_files::read(&self.input, &self.part)?;
         let net = match input {
             NetInput::Net(surface) => surface.net().clone(),
             NetInput::Mesh(mesh) => QuadNet::new(&mesh).map_err(refused)?,
         };
         let reference = match &self.reference {
             None => None,
-            Some(path) => Some(TriMesh::from_poly_mesh(&net_files::read_mesh(path)?.0)),
+            Some(path) => {
+                Some(TriMesh::from_poly_mesh(&net_files::read_mesh(path, &PartArgs::default())?.0))
+            }
         };
         let input = match &reference {
             None => Input::new(&net),

@@ -4,12 +4,12 @@ use crate::args::{ConfigArgs, ConvergedArgs, ReportArgs, check_output_path};
 use crate::checkpoints::CheckpointArgs;
 use crate::context::Context;
 use crate::failure::Failure;
+use crate::input_file::{SurfaceArgs, read_surface};
 use crate::option_flags::{OptionFlags, list, refused};
 use crate::outcome::{Outcome, Status};
 use crate::panel_files::{PANEL_OUTPUTS, encode};
 use crate::report_support;
 use crate::report_support::panels::paneling_report;
-use crate::surface_file::read_surface;
 use crate::watch::Watch;
 use bspline::BsplineSurface;
 use exchange::LengthUnit;
@@ -23,8 +23,10 @@ use std::path::{Path, PathBuf};
     after_help = "Example: umbilic panel fixtures/roof.ron --panels 30x30 --k 3 -o panels.glb -o panels.csv -o molds.step"
 )]
 pub(crate) struct Panel {
-    /// File with one B-spline surface
-    surface: PathBuf,
+    /// File with a B-spline surface
+    input: PathBuf,
+    #[command(flatten)]
+    surface: SurfaceArgs,
     /// Where to write (repeatable): panels as glb or obj, their table as csv or ron, molds as step,
     /// flat outlines of panels on planar and cylindrical molds as svg or dxf
     #[arg(short, long = "output", value_name = "FILE", required = true)]
@@ -78,9 +80,9 @@ impl Panel {
         self.report.check()?;
         let options = self.options.options(&self.config)?;
         let mut watch = Watch::new(context, "panelling")
-            .of(&self.surface)
+            .of(&self.input)
             .with_checkpoints(&self.checkpoint)?;
-        let (model, named) = read_surface(&self.surface)?;
+        let (model, named) = read_surface(&self.input, &self.surface)?;
         let unit = model.unit;
         let layout = layout(self.options.file("layout"), &options, &named.surface)?;
         let prices = match &self.prices {
@@ -96,11 +98,11 @@ impl Panel {
             (e @ (Error::NoPrice { .. } | Error::BadPrice { .. }), Some(prices)) => {
                 refused::<Options>(prices, e)
             }
-            (e, _) => refused::<Options>(&self.surface, e),
+            (e, _) => refused::<Options>(&self.input, e),
         })?;
         let (paneling, set) = (&solution.result, &solution.panels);
         let mut outcome = Outcome::new(solution.report.status, paneling.iterations())
-            .with_input(&self.surface)
+            .with_input(&self.input)
             .with_metrics(&solution.metrics)?;
         outcome.warnings = model.warnings;
         outcome.require_converged = self.converged.require_converged;

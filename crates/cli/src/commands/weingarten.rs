@@ -4,17 +4,17 @@ use crate::args::{ConfigArgs, ConvergedArgs, OutputArgs, ReportArgs, SystemArgs}
 use crate::checkpoints::CheckpointArgs;
 use crate::context::Context;
 use crate::failure::Failure;
+use crate::input_file::{SurfaceArgs, read_surface};
 use crate::option_flags::{OptionFlags, refused};
 use crate::outcome::Outcome;
 use crate::report_support;
 use crate::report_support::weingarten::weingarten_report;
-use crate::surface_file::read_surface;
 use crate::watch::Watch;
-use exchange::{LengthUnit, Model};
+use exchange::{LengthUnit, Model, NamedSurface};
 use gp_solver::SolverError;
 use serde::Serialize;
 use std::path::PathBuf;
-use weingarten::{Error, Metrics, Options, Solution, solve};
+use weingarten::{Error, Input, Metrics, Options, Solution, solve};
 
 /// Arguments of `weingarten`.
 #[derive(Debug, clap::Args)]
@@ -25,8 +25,10 @@ Examples:
       --levels 10x8,14x10,18x14,25x18 --metrics roof.json
 A relation `curve` takes its control points from a file too: --relation curve=FILE.ron.")]
 pub(crate) struct Weingarten {
-    /// File with one B-spline surface (RON, STEP)
+    /// File with a B-spline surface (RON, STEP)
     input: PathBuf,
+    #[command(flatten)]
+    surface: SurfaceArgs,
     #[command(flatten)]
     output: OutputArgs,
     #[command(flatten)]
@@ -52,8 +54,9 @@ impl Weingarten {
             .of(&self.input)
             .with_checkpoints(&self.checkpoint)?
             .with_systems(self.system.dump_system.as_deref())?;
-        let (model, named) = read_surface(&self.input)?;
-        let solution = solve(&named.surface, &options, &mut watch).map_err(|e| match e {
+        let (model, named) = read_surface(&self.input, &self.surface)?;
+        let input = Input::within(&named.surface, named.trim.as_ref());
+        let solution = solve(input, &options, &mut watch).map_err(|e| match e {
             Error::Solver(e @ SolverError::ForeignCheckpoint { .. }) => watch.foreign(&e),
             e => refused::<Options>(&self.input, e),
         })?;
@@ -66,15 +69,16 @@ impl Weingarten {
         let report = match self.report.wanted() {
             true => {
                 let unit = model.unit.to_string();
-                Some(weingarten_report(&named.surface, &solution, &options, &unit)?)
+                Some(weingarten_report(&named, &solution, &options, &unit)?)
             }
             false => None,
         };
-        let result = Model::of_surface(&named.name, solution.result, model.unit);
+        // The trim bounds the same parameters; its curves in space follow the surface.
+        let trim = named.trim.map(|trim| trim.without_edges());
+        let result = NamedSurface { surface: solution.result, trim, ..named };
+        let result = Model { unit: model.unit, surfaces: vec![result], ..Model::default() };
         for path in self.output.output {
-            let bytes =
-                exchange::encode_model(&path, &result).map_err(|e| Failure::input(&path, e))?;
-            outcome.files.push((path, bytes));
+            outcome.add_model(path, &result)?;
         }
         if let Some(report) = report {
             report_support::add_files(&mut outcome, &self.report, context, report)?;

@@ -10,6 +10,7 @@ mod dist;
 mod dist_example;
 mod every_command;
 mod fair;
+mod files;
 mod hyperbolic;
 #[cfg(unix)]
 mod interruptions;
