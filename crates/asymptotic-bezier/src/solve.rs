@@ -32,6 +32,26 @@ use crate::watch::{Entry, Watch};
 use crate::wishes::{TorsionWish, torsion_handles};
 
 /// A solved, filled and measured net; one patch is a net of one face.
+///
+/// # Example
+/// ```
+/// use asymptotic_bezier::{Options, Status, solve};
+/// # use geom_core::{DVec3, PolyMesh};
+/// # let point = |k: usize| {
+/// #     let (p, q) = (0.2 + 0.3 * (k / 4) as f64, 0.1 + 0.3 * (k % 4) as f64);
+/// #     let (u, v) = (0.5 * (p + q), 0.5 * (p - q));
+/// #     DVec3::new(u - u.powi(3) / 3.0 + u * v * v, v - v.powi(3) / 3.0 + v * u * u, u * u - v * v)
+/// # };
+/// # let corner = |k: u32| 4 * (k / 3) + k % 3;
+/// # let faces: Vec<[u32; 4]> = (0..9).map(corner).map(|a| [a, a + 4, a + 5, a + 1]).collect();
+/// // Nine quads along asymptotic lines of Enneper's surface.
+/// let mesh = PolyMesh::new((0..16).map(point).collect(), &faces)?;
+/// let solution = solve(&mesh.into(), &Options::default(), &mut ())?;
+/// assert_eq!(solution.report.status, Status::Converged);
+/// assert_eq!((solution.result.patches.len(), solution.check.joins.len()), (9, 12));
+/// assert!(solution.metrics.normal_curvature_max < 1e-9);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Clone, Debug, PartialEq)]
 pub struct Solution {
     /// Curves and patches.
@@ -158,6 +178,24 @@ pub fn solve_with(
 ///
 /// # Errors
 /// As [`solve`]; [`Error::NoSuchStage`] for quartics and joins that have none.
+///
+/// # Example
+/// ```
+/// use asymptotic_bezier::{Options, Phase, problem};
+/// # use geom_core::{DVec3, PolyMesh};
+/// # let point = |k: usize| {
+/// #     let (p, q) = (0.2 + 0.3 * (k / 4) as f64, 0.1 + 0.3 * (k % 4) as f64);
+/// #     let (u, v) = (0.5 * (p + q), 0.5 * (p - q));
+/// #     DVec3::new(u - u.powi(3) / 3.0 + u * v * v, v - v.powi(3) / 3.0 + v * u * u, u * u - v * v)
+/// # };
+/// # let corner = |k: u32| 4 * (k / 3) + k % 3;
+/// # let faces: Vec<[u32; 4]> = (0..9).map(corner).map(|a| [a, a + 4, a + 5, a + 1]).collect();
+/// // Nine quads along asymptotic lines of Enneper's surface.
+/// let mesh = PolyMesh::new((0..16).map(point).collect(), &faces)?;
+/// let problem = problem(&mesh.into(), &Options::default(), Phase::Joint)?;
+/// assert!(problem.unknowns() > 0);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 pub fn problem(input: &Input, options: &Options, phase: Phase) -> Result<Problem<'static>, Error> {
     let prepared = Prepared::new(input, -input.center()?, options)?;
     let (boundary, patch) = (&prepared.boundary, options.patch());

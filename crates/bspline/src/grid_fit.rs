@@ -206,6 +206,19 @@ impl BsplineSurface {
     /// The foot point of `point` on the surface that is found from the parameters `start`, and its
     /// distance: Gauss-Newton steps that never increase the distance, within the domain. The
     /// distance is at most that of the start.
+    ///
+    /// # Example
+    /// ```
+    /// use bspline::{BsplineSurface, Degree, KnotVector};
+    /// use geom_core::DVec3;
+    /// let line = || KnotVector::clamped_uniform(Degree::new(1)?, 2);
+    /// let corners = vec![DVec3::ZERO, DVec3::Y, DVec3::X, DVec3::X + DVec3::Y];
+    /// let square = BsplineSurface::new(line()?, line()?, corners, None)?;
+    /// let ([u, v], distance) = square.foot_point(DVec3::new(0.25, 0.75, 2.0), [0.5, 0.5]);
+    /// assert!((u - 0.25).abs() < 1e-12 && (v - 0.75).abs() < 1e-12);
+    /// assert!((distance - 2.0).abs() < 1e-12);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
     #[must_use]
     pub fn foot_point(&self, point: DVec3, start: [f64; 2]) -> ([f64; 2], f64) {
         let [mut u, mut v] = start;

@@ -80,17 +80,6 @@ pub(crate) struct ConfigArgs {
     pub(crate) config: Option<PathBuf>,
 }
 
-/// `--checkpoint` and `--resume`, for solvers that can be continued.
-#[derive(Debug, clap::Args)]
-pub(crate) struct CheckpointArgs {
-    /// Write the state of the solver here when it ends or is interrupted
-    #[arg(long, value_name = "FILE")]
-    pub(crate) checkpoint: Option<PathBuf>,
-    /// Continue from a checkpoint
-    #[arg(long, value_name = "FILE")]
-    pub(crate) resume: Option<PathBuf>,
-}
-
 /// `--dump-system`, for methods that linearise.
 #[derive(Debug, clap::Args)]
 pub(crate) struct SystemArgs {

@@ -1,6 +1,7 @@
 //! Quad nets in and hyperbolic nets out, for the commands that work on them.
 
 use crate::failure::Failure;
+use crate::input_file::{self, PartArgs, SurfaceArgs};
 use exchange::{Field, LengthUnit, Mesh, Model, NamedSurface, Net, Segment};
 use geom_core::{DVec3, PolyMesh};
 use hyperbolic_nets::{HyperbolicNet, PatchJet, QuadNet, SampledPatches};
@@ -18,10 +19,16 @@ pub(crate) enum NetInput {
     Mesh(PolyMesh),
 }
 
-/// Reads a net file (`.ron`) or the one mesh of a file.
-pub(crate) fn read(path: &Path) -> Result<(NetInput, LengthUnit, Vec<String>), Failure> {
+/// Reads a net file (`.ron`) or the one chosen mesh of a file.
+pub(crate) fn read(
+    path: &Path,
+    part: &PartArgs,
+) -> Result<(NetInput, LengthUnit, Vec<String>), Failure> {
     let refused = |e: &dyn std::fmt::Display| Failure::input(path, e);
     if exchange::extension_of(path) == "ron" {
+        if !part.part.is_empty() {
+            return Err(Failure::usage("--part has no meaning for a net file; leave it out"));
+        }
         let text = exchange::read_text(path).map_err(|e| refused(&e))?;
         let net = exchange::read_net(&text).map_err(|e| refused(&e))?;
         let mesh = net.to_poly_mesh().map_err(|e| refused(&e))?;
@@ -37,20 +44,17 @@ pub(crate) fn read(path: &Path) -> Result<(NetInput, LengthUnit, Vec<String>), F
             HyperbolicNet::new(quads, normals, net.shape_parameters).map_err(|e| refused(&e))?;
         return Ok((NetInput::Net(Box::new(surface)), net.unit, Vec::new()));
     }
-    let (mesh, unit, warnings) = read_mesh(path)?;
+    let (mesh, unit, warnings) = read_mesh(path, part)?;
     Ok((NetInput::Mesh(mesh), unit, warnings))
 }
 
-/// Reads the one mesh of a file.
-pub(crate) fn read_mesh(path: &Path) -> Result<(PolyMesh, LengthUnit, Vec<String>), Failure> {
-    let model = exchange::read_model(path).map_err(|e| Failure::input(path, e))?;
-    let mut with_faces = model.meshes.iter().filter(|m| !m.faces.is_empty());
-    let (Some(mesh), None) = (with_faces.next(), with_faces.next()) else {
-        return Err(Failure::input(
-            path,
-            "the file must hold one mesh with faces, no more and no less",
-        ));
-    };
+/// Reads the one chosen mesh of a file.
+pub(crate) fn read_mesh(
+    path: &Path,
+    part: &PartArgs,
+) -> Result<(PolyMesh, LengthUnit, Vec<String>), Failure> {
+    let model = input_file::read(path, &SurfaceArgs::default(), part)?;
+    let mesh = input_file::only_mesh(path, &model)?;
     let mesh = mesh.to_poly_mesh().map_err(|e| Failure::input(path, e))?;
     Ok((mesh, model.unit, model.warnings))
 }
@@ -93,7 +97,7 @@ pub(crate) fn encode(
             let mut surfaces = Vec::with_capacity(surface.shape().len());
             for (face, patch) in surface.patches().map_err(Failure::other)?.iter().enumerate() {
                 let surface = patch.to_surface().map_err(Failure::other)?;
-                surfaces.push(NamedSurface { name: format!("panel {face}"), surface });
+                surfaces.push(NamedSurface::new(format!("panel {face}"), surface));
             }
             write(&Model { unit: unit.clone(), surfaces, ..Model::default() })
         }

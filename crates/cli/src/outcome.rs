@@ -1,6 +1,7 @@
 //! What a command hands back: files still in memory, numbers, and a summary.
 
 use crate::failure::Failure;
+use exchange::Model;
 use serde::Serialize;
 use std::path::{Path, PathBuf};
 
@@ -63,6 +64,18 @@ impl Outcome {
         Ok(self)
     }
 
+    /// Adds a file with this content; the extension chooses the format.
+    pub(crate) fn add_model(&mut self, path: PathBuf, model: &Model) -> Result<(), Failure> {
+        let bytes = exchange::encode_model(&path, model).map_err(|e| Failure::input(&path, e))?;
+        if let Some(lost) = model.unit.lost_in(&exchange::extension_of(&path))
+            && !self.warnings.contains(&lost)
+        {
+            self.warnings.push(lost);
+        }
+        self.files.push((path, bytes));
+        Ok(())
+    }
+
     /// The bytes of the metrics file.
     pub(crate) fn metrics_file(&self, command: &str, seconds: f64, threads: usize) -> Vec<u8> {
         let file = MetricsFile {
@@ -82,8 +95,13 @@ impl Outcome {
         bytes
     }
 
-    /// Writes all files, or none of them.
-    pub(crate) fn write_files(&self, metrics: Option<(PathBuf, Vec<u8>)>) -> Result<(), Failure> {
+    /// Writes all files, or none of them if `is_stopped` says so meanwhile; returns whether they
+    /// were written.
+    pub(crate) fn write_files(
+        &self,
+        metrics: Option<(PathBuf, Vec<u8>)>,
+        is_stopped: &dyn Fn() -> bool,
+    ) -> Result<bool, Failure> {
         let files: Vec<(&Path, &[u8])> = self
             .written()
             .chain(metrics.as_ref())
@@ -95,7 +113,7 @@ impl Outcome {
                 return Err(Failure::usage(format!("{}: {message}", path.display())));
             }
         }
-        exchange::write_files(&files).map_err(Failure::usage)
+        exchange::write_files_unless(&files, is_stopped).map_err(Failure::usage)
     }
 
     fn written(&self) -> impl Iterator<Item = &(PathBuf, Vec<u8>)> {

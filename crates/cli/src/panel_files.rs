@@ -57,7 +57,7 @@ fn encode_one(
             for (m, mold) in paneling.molds.iter().enumerate() {
                 let surface = paneling.mold_surface(set, m).map_err(Failure::other)?;
                 let name = mold_name(m, mold);
-                model.surfaces.push(NamedSurface { name, surface });
+                model.surfaces.push(NamedSurface::new(name, surface));
             }
             exchange::encode_model(path, &model).map_err(|e| Failure::input(path, e))
         }

@@ -52,8 +52,13 @@ pub(crate) fn add_model(report: &mut Report, model: &Model) -> Result<(), Failur
         let name = if mesh.name.is_empty() { "mesh" } else { &mesh.name };
         report.stages.push(mesh_view(name, mesh, &report.length_unit)?);
     }
-    if !model.surfaces.is_empty() {
-        let surfaces: Vec<_> = model.surfaces.iter().map(|s| &s.surface).collect();
+    let (trimmed, whole): (Vec<_>, Vec<_>) = model.surfaces.iter().partition(|s| s.trim.is_some());
+    if !trimmed.is_empty() {
+        let mesh = exchange::joined_mesh("trimmed faces", trimmed);
+        report.stages.push(mesh_view(&mesh.name, &mesh, &report.length_unit)?);
+    }
+    if !whole.is_empty() {
+        let surfaces: Vec<_> = whole.iter().map(|s| &s.surface).collect();
         let name = if surfaces.len() == 1 { "surface" } else { "surfaces" };
         report.stages.push(spline_view(name, &surfaces, None, &report.length_unit)?);
     }

@@ -10,7 +10,7 @@ use crate::model::Model;
 use crate::obj::{read_obj, write_obj};
 use crate::off::read_off;
 use crate::ply::{read_ply, write_ply};
-use crate::sample::surface_mesh;
+use crate::sample::face_mesh;
 use crate::scene::{read_scene, write_scene};
 use crate::step::{read_step, write_step};
 use crate::stl::{read_stl, write_stl};
@@ -94,7 +94,8 @@ pub fn encode_model(path: &Path, model: &Model) -> Result<Vec<u8>, WriteError> {
             if model.surfaces.is_empty() {
                 return Err(unsupported("STEP", "a model without surfaces"));
             }
-            Ok(write_step(model).into_bytes())
+            let text = write_step(model).map_err(|e| unsupported("STEP", &e.to_string()))?;
+            Ok(text.into_bytes())
         }
         "obj" => Ok(write_obj(&sampled(model)).into_bytes()),
         "ply" => Ok(write_ply(&sampled(model), &model.unit)),
@@ -147,7 +148,7 @@ fn sampled(model: &Model) -> Cow<'_, [Mesh]> {
     if model.surfaces.is_empty() {
         return Cow::Borrowed(&model.meshes);
     }
-    let sampled = model.surfaces.iter().map(|s| surface_mesh(&s.name, &s.surface, None));
+    let sampled = model.surfaces.iter().map(|s| face_mesh(s, None));
     Cow::Owned(sampled.chain(model.meshes.iter().cloned()).collect())
 }
 

@@ -11,7 +11,7 @@ use geom_core::DVec3;
 use std::path::{Path, PathBuf};
 
 fn surfaces() -> Vec<NamedSurface> {
-    let named = |name: &str, surface| NamedSurface { name: name.to_owned(), surface };
+    let named = |name: &str, surface| NamedSurface::new(name, surface);
     vec![
         named("roof", Shape::Roof.surface(9, 8, 4, 3)),
         named("tube", Shape::Tube.surface(9, 8, 3, 4)),
@@ -222,4 +222,19 @@ fn meshes_of_other_programs() {
         let error = exchange::read_model(&folder.join("hostile").join(name)).unwrap_err();
         assert!(error.to_string().starts_with(want), "{name}: {error}");
     }
+}
+
+#[test]
+fn files_that_other_readers_take_are_taken() {
+    let folder = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../../fixtures/read");
+    let read = |name: &str| exchange::read_model(&folder.join(name));
+    let net = &read("tokens-over-lines.off").unwrap().meshes[0];
+    assert_eq!((net.positions.len(), net.faces.len()), (25, 16));
+    assert_eq!(net.faces.get(15), [18, 19, 24, 23]);
+    assert!(!read("upper-case-magic.ply").unwrap().meshes[0].positions.is_empty());
+    let twice = read("dupvert.ply").unwrap_err().to_string();
+    assert_eq!(
+        twice,
+        "line 7: declared before: `element vertex 3`; give every kind of element once"
+    );
 }

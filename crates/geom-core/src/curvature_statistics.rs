@@ -77,6 +77,21 @@ impl CurvatureStatistics {
     }
 
     /// Adds the samples of another surface.
+    ///
+    /// # Example
+    /// ```
+    /// use geom_core::{CurvatureStatistics, DVec3};
+    /// let patch = |area: f64, h: f64| {
+    ///     let mut patch = CurvatureStatistics::default();
+    ///     patch.add_area(area);
+    ///     patch.add(DVec3::ZERO, area, h, h * h);
+    ///     patch
+    /// };
+    /// let mut both = patch(1.0, -1.0); // of two spheres
+    /// both.merge(&patch(3.0, -0.5));
+    /// let h = both.mean_curvature().expect("samples");
+    /// assert_eq!((both.area, h.min, h.max, h.mean_abs), (4.0, -1.0, -0.5, 0.625));
+    /// ```
     pub fn merge(&mut self, other: &Self) {
         self.area += other.area;
         self.samples += other.samples;

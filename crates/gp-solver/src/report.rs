@@ -5,6 +5,12 @@ use std::time::Duration;
 
 /// How a solve or a run ended. The iterate of a solve is usable in every case; a method may look at
 /// its result and find it [`Failed`](Self::Failed).
+///
+/// # Example
+/// ```
+/// use gp_solver::Status;
+/// assert_eq!(Status::IterationLimit.to_string(), "iteration_limit");
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Status {
     /// A stop rule of [`Options`](crate::Options) was met.
@@ -123,6 +129,20 @@ pub struct Timings {
 }
 
 /// What a solve did.
+///
+/// # Example
+/// ```
+/// use gp_solver::{Closeness, Options, Problem, solve};
+/// let mut problem = Problem::new(1);
+/// problem.add(Closeness::new("here", vec![0.0], vec![1.0]));
+/// problem.add(Closeness::new("there", vec![4.0], vec![1.0]));
+/// let report = solve(problem, &mut [0.0], &Options::default())?;
+/// // The mean, 2, is as far from one as from the other.
+/// assert_eq!((report.initial_energy, report.terms[1].name.as_str()), (8.0, "there"));
+/// assert!((report.terms[1].energy - 2.0).abs() < 1e-6);
+/// assert_eq!(report.history.len(), report.iterations + 1);
+/// # Ok::<(), gp_solver::SolverError>(())
+/// ```
 #[derive(Clone, Debug, PartialEq)]
 pub struct Report {
     /// How it ended.

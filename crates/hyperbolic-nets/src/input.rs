@@ -6,6 +6,19 @@ use crate::net::{AsymptoticField, QuadNet};
 
 /// A net along the asymptotic directions of a surface, and that surface; kept in normalised
 /// coordinates (see [`Normalization`]), where everything is computed.
+///
+/// # Example
+/// ```
+/// use geom_core::{PolyMesh, TriMesh};
+/// use hyperbolic_nets::{Input, QuadNet};
+/// let model = fixtures::asymptotic_nets::scherk(6);
+/// let net = QuadNet::new(&PolyMesh::new(model.positions, &model.quads)?)?;
+/// // Near its own faces, or near a mesh of the surface.
+/// assert!(Input::new(&net).place().is_ok());
+/// let surface = TriMesh::from_poly_mesh(net.mesh());
+/// assert_eq!(Input::near_mesh(&net, &surface).given().quads().len(), 36);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 pub struct Input<'a> {
     given: &'a QuadNet,
     place: Result<Normalization, NormalizationError>,

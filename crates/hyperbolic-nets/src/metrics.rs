@@ -14,6 +14,18 @@ use crate::net::{
 const SAME_SHAPE: f64 = 1e-3;
 
 /// Measures of a hyperbolic net against the surface it stands for.
+///
+/// # Example
+/// ```
+/// use geom_core::PolyMesh;
+/// use hyperbolic_nets::{Input, Options, QuadNet, solve};
+/// let model = fixtures::asymptotic_nets::scherk(6);
+/// let net = QuadNet::new(&PolyMesh::new(model.positions, &model.quads)?)?;
+/// let metrics = solve(&Input::new(&net), &Options::default(), &mut ())?.metrics;
+/// assert_eq!((metrics.faces, metrics.vertices, metrics.irregular_vertices), (36, 49, 0));
+/// assert!(metrics.star_planarity_max < 1e-9 && metrics.negative_curvature_percent > 99.0);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Metrics {
     /// Faces.

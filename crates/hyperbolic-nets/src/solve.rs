@@ -15,6 +15,19 @@ use crate::options::{Boundary, Method, Options};
 use crate::warning::Warning;
 
 /// A hyperbolic net with what is to be said about it.
+///
+/// # Example
+/// ```
+/// use geom_core::PolyMesh;
+/// use hyperbolic_nets::{Input, Options, QuadNet, Status, solve};
+/// let model = fixtures::asymptotic_nets::scherk(6);
+/// let net = QuadNet::new(&PolyMesh::new(model.positions, &model.quads)?)?;
+/// let solution = solve(&Input::new(&net), &Options::default(), &mut ())?;
+/// assert_eq!(solution.report.status, Status::Converged);
+/// assert_eq!(solution.result.shape().len(), 36);
+/// assert!(solution.metrics.kink_max_deg < 1e-9 && solution.metrics.folds == 0);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Clone, Debug)]
 pub struct Solution {
     /// The net with its shape parameters, and its Lelieuvre normals from the joint method.
@@ -155,6 +168,18 @@ fn restored(
 ///
 /// # Errors
 /// As [`solve`]; the input is not inspected.
+///
+/// # Example
+/// ```
+/// use geom_core::PolyMesh;
+/// use hyperbolic_nets::{Input, Options, POSITIONS, QuadNet, problem};
+/// let model = fixtures::asymptotic_nets::scherk(6);
+/// let net = QuadNet::new(&PolyMesh::new(model.positions, &model.quads)?)?;
+/// let (input, options) = (Input::new(&net), Options::default());
+/// let problem = problem(&input, &options)?;
+/// assert_eq!(problem.variables().group(POSITIONS)?.len(), 49);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 pub fn problem<'i>(input: &'i Input<'i>, options: &'i Options) -> Result<Problem<'i>, Error> {
     options.check()?;
     input.place()?;

@@ -73,6 +73,18 @@ impl Quality {
 }
 
 /// The numbers of a solution.
+///
+/// # Example
+/// ```
+/// use paneling::{Counts, Options, solve};
+/// let surface = fixtures::surfaces::Shape::Saddle.surface(8, 8, 4, 4);
+/// let panels = Some(Counts { u: 4, v: 3 });
+/// let options = Options { panels, molds: Some(3), ..Options::default() };
+/// let metrics = solve(&surface, &options, &mut ())?.metrics;
+/// // Without prices every mold costs 1 and panels nothing.
+/// assert_eq!((metrics.quality.molds, metrics.cost, metrics.worst_excess), (3, 3.0, None));
+/// # Ok::<(), paneling::Error>(())
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Metrics {
     /// How well the panels meet.

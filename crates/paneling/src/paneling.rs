@@ -8,6 +8,18 @@ use crate::search::attempt::Found;
 use geom_core::DVec3;
 
 /// Panels on their molds; lengths in model units.
+///
+/// # Example
+/// ```
+/// use paneling::{Counts, MoldType, Options, Price, PriceList, solve};
+/// let surface = fixtures::surfaces::Shape::Saddle.surface(8, 8, 4, 4);
+/// let panels = Some(Counts { u: 4, v: 3 });
+/// let options = Options { panels, molds: Some(3), ..Options::default() };
+/// let paneling = solve(&surface, &options, &mut ())?.result;
+/// let prices = PriceList::new([(MoldType::Cubic, Price { mold: 900.0, panel: 45.0 })]);
+/// assert_eq!(paneling.cost(&prices), 3.0 * 900.0 + 12.0 * 45.0);
+/// # Ok::<(), paneling::Error>(())
+/// ```
 #[derive(Clone, Debug, PartialEq)]
 pub struct Paneling {
     /// The molds.

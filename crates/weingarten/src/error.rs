@@ -5,6 +5,15 @@ use geom_core::NormalizationError;
 use gp_solver::SolverError;
 
 /// What makes it impossible to attempt an optimisation. Not converging is a status, not an error.
+///
+/// # Example
+/// ```
+/// use weingarten::{Options, solve};
+/// let roof = fixtures::surfaces::Shape::Roof.surface(8, 7, 4, 4);
+/// let options = Options { closeness: -1.0, ..Options::default() };
+/// let error = solve(&roof, &options, &mut ()).unwrap_err();
+/// assert_eq!(error.to_string(), "`closeness` is -1; it must be zero or more");
+/// ```
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 #[expect(missing_docs, reason = "the messages spell out every field")]
@@ -21,6 +30,9 @@ pub enum Error {
     /// Not enough samples to see the surface.
     #[error("{found} samples in {direction} are too few; ask for at least {needed}")]
     TooFewSamples { direction: &'static str, found: usize, needed: usize },
+    /// A trim without a sample in it.
+    #[error("no sample lies within the trim of the surface; ask for more `samples`")]
+    NothingInside,
     /// More samples or control points than could ever be wanted.
     #[error("{count} {what} are more than the {limit} that are supported; ask for fewer")]
     TooMany { what: &'static str, count: usize, limit: usize },

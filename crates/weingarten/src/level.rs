@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use bspline::BsplineSurface;
+use bspline::{BsplineSurface, Trim};
 use gp_solver::{Closeness, Problem, Stage};
 
 use crate::blocks::{Alignment, BorderGlide, Fairness, Net, Parallel, RelationRows, Shape};
@@ -31,13 +31,15 @@ pub(crate) struct Level {
 }
 
 impl Level {
-    /// The level of a reference on the working scale.
+    /// The level of a reference on the working scale, of which the part within `trim` counts.
     pub(crate) fn new(
         reference: BsplineSurface,
+        trim: Option<&Trim>,
         samples: Option<gp_solver::Counts>,
         stage: Stage,
     ) -> Result<Self, Error> {
-        let grid = Arc::new(SampleGrid::uniform(&reference, sample_counts(&reference, samples)));
+        let grid = SampleGrid::uniform(&reference, sample_counts(&reference, samples));
+        let grid = Arc::new(grid.within(trim, &reference));
         let samples = regular_samples(&grid, &coordinates(&reference))?;
         let curvature = curvature_size(&reference, &samples).unwrap_or(1.0);
         Ok(Self { reference, grid, curvature, stage })

@@ -1,10 +1,11 @@
 //! How Weingarten a surface is, and how far it has moved.
 
-use bspline::BsplineSurface;
+use bspline::{BsplineSurface, Trim, TrimLoop};
 use geom_core::BoundingBox;
 
 use crate::field::{Sample, samples};
 use crate::grid::SampleGrid;
+use crate::input::Input;
 use crate::locus::RelationLocus;
 use crate::target::Target;
 use crate::variables::coordinates;
@@ -15,13 +16,25 @@ const CONSTANT_RATIO: f64 = 1e-9;
 /// What is reported about a surface. Everything is measured on the surface itself at the cell
 /// midpoints of a grid with twice the samples in each direction, never on auxiliary variables.
 /// Curvatures are in units of the model.
+///
+/// # Example
+/// ```
+/// use weingarten::{Options, solve};
+/// // Every surface of revolution is a Weingarten surface: its diagram is a curve.
+/// let torus = fixtures::surfaces::torus_patch(4, 3);
+/// let options = Options { iterations: 0, ..Options::default() };
+/// let metrics = solve(&torus, &options, &mut ())?.metrics;
+/// assert!(metrics.diagram_area < 1e-9 && metrics.alignment_rms < 1e-6);
+/// assert!(metrics.gaussian_curvature_min < 0.0 && metrics.gaussian_curvature_max > 0.0);
+/// # Ok::<(), weingarten::Error>(())
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
 pub struct Metrics {
     /// Root mean square sine of the angle between `∇_s H` and `∇_s K`, weighted by area and
     /// gradients: `√(Σ J²/Δ / Σ |∇_s H|² |∇_s K|²)` with `J = H_u K_v − H_v K_u`. 0 where `H` or
     /// `K` is constant.
     pub alignment_rms: f64,
-    /// Integral of `|J|` over the parameter domain, over `range H · range K`: the area the
+    /// Integral of `|J|` over the parameter domain (within the trim), over `range H · range K`: the area the
     /// curvature diagram sweeps in units of its box. 0 where `H` or `K` is constant to 1e-9 of
     /// its size.
     pub diagram_area: f64,
@@ -55,6 +68,7 @@ pub struct Metrics {
 /// Measures surfaces against the input they come from.
 pub(crate) struct Meter<'a> {
     input: &'a BsplineSurface,
+    trim: Option<&'a Trim>,
     /// Size of the input, and the diagonal of the box of its control points.
     size: f64,
     diagonal: f64,
@@ -67,21 +81,16 @@ pub(crate) type ScaledTarget<'t> = Option<&'t Target>;
 
 impl<'a> Meter<'a> {
     /// `size` is that of the input, `samples` are those of the optimiser, `unit` its working scale.
-    pub(crate) fn new(
-        input: &'a BsplineSurface,
-        size: f64,
-        samples: [usize; 2],
-        unit: f64,
-    ) -> Self {
-        let diagonal = BoundingBox::of(input.control_points().iter().copied())
-            .map_or(1.0, BoundingBox::diagonal);
-        Self { input, size, diagonal, samples, unit }
+    pub(crate) fn new(input: Input<'a>, size: f64, samples: [usize; 2], unit: f64) -> Self {
+        let points = input.surface.control_points().iter().copied();
+        let diagonal = BoundingBox::of(points).map_or(1.0, BoundingBox::diagonal);
+        Self { input: input.surface, trim: input.trim, size, diagonal, samples, unit }
     }
 
     /// The metrics of `surface`.
     pub(crate) fn measure(&self, surface: &BsplineSurface, target: ScaledTarget<'_>) -> Metrics {
         let fine = self.samples.map(|m| 2 * m);
-        let grid = SampleGrid::midpoints(surface, fine);
+        let grid = SampleGrid::midpoints(surface, fine).within(self.trim, surface);
         let here = samples(&grid, &coordinates(surface));
         let (mean, max) = deviation(self.input, &grid, &here);
         let border = self.border_deviation(surface, fine);
@@ -93,7 +102,7 @@ impl<'a> Meter<'a> {
                 .fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), x| (l.min(x), h.max(x)))
         };
         let (h, k) = (range(|s| s.jet.h), range(|s| s.jet.k));
-        let (alignment_rms, diagram_area) = self.alignment(surface, &here, h, k);
+        let (alignment_rms, diagram_area) = self.alignment(surface, &here, grid.len(), h, k);
         Metrics {
             alignment_rms,
             diagram_area,
@@ -113,7 +122,7 @@ impl<'a> Meter<'a> {
 
     /// Where the relation holds in the diagram, fitted to `surface` if it is one to fit.
     pub(crate) fn locus(&self, surface: &BsplineSurface, target: &Target) -> RelationLocus {
-        let grid = SampleGrid::midpoints(surface, self.samples);
+        let grid = SampleGrid::midpoints(surface, self.samples).within(self.trim, surface);
         target.locus(&rescaled(samples(&grid, &coordinates(surface)), self.unit))
     }
 
@@ -121,6 +130,7 @@ impl<'a> Meter<'a> {
         &self,
         surface: &BsplineSurface,
         here: &[Sample],
+        cells: usize,
         h: (f64, f64),
         k: (f64, f64),
     ) -> (f64, f64) {
@@ -140,12 +150,12 @@ impl<'a> Meter<'a> {
             area += j.abs();
         }
         let (u, v) = (surface.knots_u().domain(), surface.knots_v().domain());
-        let cell = (u.1 - u.0) * (v.1 - v.0) / here.len() as f64;
+        let cell = (u.1 - u.0) * (v.1 - v.0) / cells as f64;
         let alignment = if weight > 0.0 { (sine / weight).sqrt() } else { 0.0 };
         (alignment, area * cell / (range_h * range_k))
     }
 
-    /// Largest distance along the open sides, at midpoints and corners.
+    /// Largest distance along the open sides, at midpoints and corners, or along the trim.
     fn border_deviation(&self, surface: &BsplineSurface, fine: [usize; 2]) -> f64 {
         let (ku, kv) = (surface.knots_u(), surface.knots_v());
         let with_ends = |knots: &bspline::KnotVector, m: usize| {
@@ -157,6 +167,11 @@ impl<'a> Meter<'a> {
         };
         let (u, v) = (with_ends(ku, fine[0]), with_ends(kv, fine[1]));
         let mut pairs = Vec::new();
+        if let Some(trim) = self.trim {
+            let places = trim.loops().iter().flat_map(TrimLoop::polygon);
+            pairs.extend(places.map(|p| [p.x, p.y]));
+            return self.largest_deviation(surface, &pairs);
+        }
         if !kv.is_periodic() {
             let (start, end) = kv.domain();
             pairs.extend(u.iter().flat_map(|&u| [[u, start], [u, end]]));
@@ -165,8 +180,12 @@ impl<'a> Meter<'a> {
             let (start, end) = ku.domain();
             pairs.extend(v.iter().flat_map(|&v| [[start, v], [end, v]]));
         }
-        let here = surface.jets(&pairs, 0);
-        let there = self.input.jets(&pairs, 0);
+        self.largest_deviation(surface, &pairs)
+    }
+
+    fn largest_deviation(&self, surface: &BsplineSurface, pairs: &[[f64; 2]]) -> f64 {
+        let here = surface.jets(pairs, 0);
+        let there = self.input.jets(pairs, 0);
         let distance = |(a, b): (&geom_core::SurfaceJet, &geom_core::SurfaceJet)| {
             a.position().distance(b.position())
         };
@@ -178,8 +197,8 @@ impl<'a> Meter<'a> {
 fn deviation(input: &BsplineSurface, grid: &SampleGrid, here: &[Sample]) -> (f64, f64) {
     let there = input.point_grid(&grid.u.parameters, &grid.v.parameters);
     let (mut sum, mut max) = (0.0, 0.0f64);
-    for (s, p) in here.iter().zip(&there) {
-        let d = s.point.distance(*p);
+    for (k, s) in here.iter().enumerate() {
+        let d = s.point.distance(there[grid.place(k)]);
         sum += d;
         max = max.max(d);
     }

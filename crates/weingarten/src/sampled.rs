@@ -61,8 +61,11 @@ impl SampledSurface {
     }
 }
 
-/// The samples of a surface, each checked to be regular.
+/// The samples of a surface that count, each checked to be regular.
 pub(crate) fn regular_samples(grid: &SampleGrid, x: &[f64]) -> Result<Vec<Sample>, Error> {
+    if grid.count() == 0 {
+        return Err(Error::NothingInside);
+    }
     let samples = samples(grid, x);
     let singular = |s: &Sample| {
         let first = FirstForm { e: s.e, f: s.f, g: s.g };
@@ -70,7 +73,7 @@ pub(crate) fn regular_samples(grid: &SampleGrid, x: &[f64]) -> Result<Vec<Sample
     };
     match samples.iter().position(singular) {
         Some(k) => {
-            let [u, v] = grid.parameters(k);
+            let [u, v] = grid.parameters(grid.place(k));
             Err(Error::Singular { u, v })
         }
         None => Ok(samples),

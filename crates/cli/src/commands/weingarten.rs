@@ -1,19 +1,21 @@
 //! `umbilic weingarten SURFACE -o OUT`.
 
-use crate::args::{CheckpointArgs, ConfigArgs, EndingArgs, OutputArgs, ReportArgs, SystemArgs};
+use crate::args::{ConfigArgs, EndingArgs, OutputArgs, ReportArgs, SystemArgs};
+use crate::checkpoints::CheckpointArgs;
 use crate::context::Context;
 use crate::failure::Failure;
+use crate::input_file::{SurfaceArgs, read_surface};
 use crate::option_flags::{OptionFlags, refused};
 use crate::outcome::{Outcome, Status};
 use crate::report_support;
 use crate::report_support::weingarten::weingarten_report;
-use crate::surface_file::read_surface;
 use crate::watch::Watch;
 use bspline::{Flaw, FlawKind};
-use exchange::{LengthUnit, Model};
+use exchange::{LengthUnit, Model, NamedSurface};
+use gp_solver::SolverError;
 use serde::Serialize;
 use std::path::PathBuf;
-use weingarten::{Metrics, Options, Solution, solve};
+use weingarten::{Error, Input, Metrics, Options, Solution, solve};
 
 /// Arguments of `weingarten`.
 #[derive(Debug, clap::Args)]
@@ -24,8 +26,10 @@ Examples:
       --levels 10x8,14x10,18x14,25x18 --metrics roof.json
 A relation `curve` takes its control points from a file too: --relation curve=FILE.ron.")]
 pub(crate) struct Weingarten {
-    /// File with one B-spline surface (RON, STEP)
+    /// File with a B-spline surface (RON, STEP)
     input: PathBuf,
+    #[command(flatten)]
+    surface: SurfaceArgs,
     #[command(flatten)]
     output: OutputArgs,
     #[command(flatten)]
@@ -47,28 +51,35 @@ impl Weingarten {
         self.output.check()?;
         self.report.check()?;
         let options = self.options.options(&self.config)?;
-        let (model, named) = read_surface(&self.input)?;
         let mut watch = Watch::new(context, "optimising")
+            .of(&self.input)
             .with_checkpoints(&self.checkpoint)?
             .with_systems(self.system.dump_system.as_deref())?;
-        let solution = solve(&named.surface, &options, &mut watch)
-            .map_err(|e| refused::<Options>(&self.input, e))?;
+        let (model, named) = read_surface(&self.input, &self.surface)?;
+        let input = Input::within(&named.surface, named.trim.as_ref());
+        let solution = solve(input, &options, &mut watch).map_err(|e| match e {
+            Error::Solver(e @ SolverError::ForeignCheckpoint { .. }) => watch.foreign(&e),
+            e => refused::<Options>(&self.input, e),
+        })?;
         let mut outcome = outcome(&solution, &model.unit)?.with_input(&self.input);
-        watch.finish(&mut outcome)?;
         outcome.warnings.extend(model.warnings);
         self.ending.apply(&mut outcome);
+        if !watch.finish(&mut outcome) {
+            return Ok(outcome);
+        }
         let report = match self.report.wanted() {
             true => {
                 let unit = model.unit.to_string();
-                Some(weingarten_report(&named.surface, &solution, &options, &unit)?)
+                Some(weingarten_report(&named, &solution, &options, &unit)?)
             }
             false => None,
         };
-        let result = Model::of_surface(&named.name, solution.result, model.unit);
+        // The trim bounds the same parameters; its curves in space follow the surface.
+        let trim = named.trim.map(|trim| trim.without_edges());
+        let result = NamedSurface { surface: solution.result, trim, ..named };
+        let result = Model { unit: model.unit, surfaces: vec![result], ..Model::default() };
         for path in self.output.output {
-            let bytes =
-                exchange::encode_model(&path, &result).map_err(|e| Failure::input(&path, e))?;
-            outcome.files.push((path, bytes));
+            outcome.add_model(path, &result)?;
         }
         if let Some(report) = report {
             report_support::add_files(&mut outcome, &self.report, context, report)?;

@@ -201,7 +201,7 @@ impl Glb {
         let nodes: Vec<usize> = (0..self.nodes.len()).collect();
         let mut document = json!({
             "asset": {
-                "version": "2.0", "generator": "umbilic",
+                "version": "2.0", "generator": "Umbilic",
                 "extras": { "unit": unit.to_string() }
             },
             "scene": 0, "scenes": [{}],

@@ -22,6 +22,25 @@ struct BlockValues {
 /// problem is linearised and stepped any number of times.
 ///
 /// This is what the solvers stand on; it is public for callers that drive their own iteration.
+///
+/// # Example
+/// ```
+/// use gp_solver::{Factorization, Problem, QuadraticBuilder, System};
+/// // Newton's root of 2: x ← x − (x² − 2) / 2x.
+/// let mut root = QuadraticBuilder::new("root");
+/// root.equation(1.0).product(0, 0, 1.0).constant(-2.0);
+/// let mut problem = Problem::new(1);
+/// problem.add(root.build());
+/// let mut system = System::new(problem, Factorization::Auto)?;
+/// let mut x = [1.0];
+/// for _ in 0..6 {
+///     system.linearize(&x)?;
+///     system.damped_step(0.0)?;
+///     system.stepped_into(&x.clone(), &mut x);
+/// }
+/// assert!((x[0] - 2.0_f64.sqrt()).abs() < 1e-15);
+/// # Ok::<(), gp_solver::SolverError>(())
+/// ```
 pub struct System<'a> {
     problem: Problem<'a>,
     wanted: Factorization,
@@ -121,6 +140,17 @@ impl<'a> System<'a> {
     ///
     /// # Errors
     /// What [`SolverError`] says of malformed blocks.
+    ///
+    /// # Example
+    /// ```
+    /// use gp_solver::{Closeness, Factorization, Problem, System};
+    /// let mut system = System::new(Problem::new(1), Factorization::Auto)?;
+    /// let target = system.add(Closeness::new("target", vec![3.0], vec![2.0]))?;
+    /// assert_eq!(system.linearize(&[0.0])?, 18.0); // ½ (2 · 3)²
+    /// system.set_weight(target, 0.5)?;
+    /// assert_eq!(system.linearize(&[0.0])?, 4.5);
+    /// # Ok::<(), gp_solver::SolverError>(())
+    /// ```
     pub fn add(&mut self, block: impl ResidualBlock + 'a) -> Result<BlockId, SolverError> {
         let block = Block::Residual(Box::new(block));
         Seen::new(self.problem.unknowns()).check(&block)?;

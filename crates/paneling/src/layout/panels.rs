@@ -59,6 +59,17 @@ pub(crate) struct Samples {
 }
 
 /// The panels of a surface, ready to be fitted.
+///
+/// # Example
+/// ```
+/// use paneling::{Layout, PanelSet, Pattern};
+/// let surface = fixtures::surfaces::Shape::Saddle.surface(8, 8, 4, 4);
+/// let layout = Layout::generate(Pattern::Quad, 4, 3, [false, false])?;
+/// let panels = PanelSet::new(&surface, &layout)?;
+/// // Between four by three panels there are 3 · 3 + 4 · 2 seams.
+/// assert_eq!((panels.len(), panels.seams().len()), (12, 17));
+/// # Ok::<(), paneling::Error>(())
+/// ```
 #[derive(Clone, Debug)]
 pub struct PanelSet {
     /// Samples of panel `p` are `starts[p]..starts[p + 1]`: along the border, halfway in, middle.
