@@ -228,7 +228,7 @@ impl<'m> Maker<'m> {
 
     /// A patch at a crease or at the boundary that is no polynomial.
     fn add_fitted(&mut self, face: FaceId) -> Result<(), LimitPatchError> {
-        let patch = self.surface.patches()[face.index()];
+        let patch = &self.surface.patches()[face.index()];
         if !self.fits.contains_key(&patch.basis) {
             self.fits.insert(patch.basis, FittedRule::new(self.surface, patch.basis)?);
         }
