@@ -49,7 +49,7 @@ impl Convert {
         check_output_path(&self.output)?;
         self.report.check()?;
         let mut model = input_file::read(&self.input, &self.surface, &self.part)?;
-        if let Some(unit) = self.unit {
+        if let Some(unit) = self.unit.clone() {
             model = model.in_unit(unit).map_err(|e| Failure::input(&self.input, e))?;
         }
         let mut outcome = Outcome::new(Status::Converged, 0).with_input(&self.input);

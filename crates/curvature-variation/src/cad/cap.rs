@@ -7,10 +7,10 @@
 //! `p_v(u, 0) + q_u(0, u) = 2 cos(2π/n) (1 − u)² p_u(u, 0)`
 //!
 //! with an edge of degree four, so that tangent planes agree to the last digit wherever the control
-//! points are (the geometric continuity of Loop and Schaefer 2008, here as equations). What freedom
-//! is left brings the cap near to the subdivision surface by least squares, at places that
-//! correspond in the characteristic map: all of it is linear in the control points and is computed
-//! once for a valence.
+//! points are; the factor is that of a regular polygon of tangents at the vertex and vanishes twice
+//! at the ring, where neighbours join smoothly. What freedom is left brings the cap near to the
+//! subdivision surface by least squares, at places that correspond in the characteristic map: all
+//! of it is linear in the control points and is computed once for a valence.
 
 use super::chart::{Chart, magnified};
 use super::net::{COARSE, FINE, cell, count, cubic, inner, place, refinement, turned};

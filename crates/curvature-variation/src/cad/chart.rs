@@ -20,9 +20,7 @@ pub(super) struct Chart {
     /// By how much a step shrinks it: the subdominant eigenvalue.
     pub(super) ratio: f64,
     valence: usize,
-    /// The eigenvector, on a net of reach [`COARSE`].
-    pub(super) coarse: Vec<[f64; 2]>,
-    /// The same net at reach [`FINE`].
+    /// The eigenvector, on a net of reach [`FINE`].
     pub(super) fine: Vec<[f64; 2]>,
 }
 
@@ -59,7 +57,7 @@ impl Chart {
             }
             coarse = inner.iter().map(|k| fine[*k]).collect();
         }
-        Self { ratio, valence, coarse, fine }
+        Self { ratio, valence, fine }
     }
 
     /// The place of parameters of sector 0 in `[0, 1]²`, and its derivatives by both.

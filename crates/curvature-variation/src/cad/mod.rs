@@ -228,9 +228,10 @@ impl<'m> Maker<'m> {
 
     /// A patch at a crease or at the boundary that is no polynomial.
     fn add_fitted(&mut self, face: FaceId) -> Result<(), LimitPatchError> {
-        let patch = &self.surface.patches()[face.index()];
+        let surface = self.surface;
+        let patch = &surface.patches()[face.index()];
         if !self.fits.contains_key(&patch.basis) {
-            self.fits.insert(patch.basis, FittedRule::new(self.surface, patch.basis)?);
+            self.fits.insert(patch.basis, FittedRule::new(surface, patch.basis)?);
         }
         let positions = self.mesh.positions();
         let control = |k: usize| positions[patch.controls[k] as usize];

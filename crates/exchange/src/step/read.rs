@@ -254,6 +254,8 @@ impl<'a> Reader<'_, 'a> {
             let what = "the assembly contains itself or is nested too deeply";
             return Err(ReadError::content(what, "export it again"));
         }
+        // Parts that double at every level are too many even where they hold nothing.
+        self.take(1)?;
         path.push(group);
         for k in self.tree.members(group).collect::<Vec<_>>() {
             let name = self.tree.name(group).unwrap_or_default().to_owned();
@@ -279,6 +281,16 @@ impl<'a> Reader<'_, 'a> {
         Ok(())
     }
 
+    /// Takes so many control points off the budget.
+    fn take(&mut self, needed: usize) -> Result<(), ReadError> {
+        let Some(left) = self.budget.checked_sub(needed) else {
+            let what = "the placed parts need more memory than a file of this size may take";
+            return Err(ReadError::content(what, "open the parts one by one"));
+        };
+        self.budget = left;
+        Ok(())
+    }
+
     /// One face in its place, under the name of the part if it has none of its own.
     fn push(
         &mut self,
@@ -291,11 +303,7 @@ impl<'a> Reader<'_, 'a> {
         let edges = trim.iter().flat_map(|t| t.loops()).flat_map(|l| l.curves());
         let in_edges: usize = edges.map(|c| 4 + 2 * c.parameters.control_points().len()).sum();
         let needed = surface.control_points().len() + in_edges;
-        let Some(left) = self.budget.checked_sub(needed) else {
-            let what = "the placed parts need more memory than a file of this size may take";
-            return Err(ReadError::content(what, "open the parts one by one"));
-        };
-        self.budget = left;
+        self.take(needed)?;
         let (mut surface, mut trim) = (surface.clone(), trim.clone());
         if map != DAffine3::IDENTITY {
             let place = |p| map.transform_point3(p);
