@@ -1,4 +1,5 @@
 //! What holds for any spline: random degrees, knots, control points and weights.
+#![allow(clippy::unwrap_used, reason = "a test may stop at the first surprise")]
 
 use bspline::{BsplineCurve, BsplineSurface, Degree, KnotVector, SampleGrid, fit_curve};
 use geom_core::{DMat3, DVec3, SurfaceJet};

@@ -1,4 +1,5 @@
 //! What holds for any surface point, any triangles and any mesh.
+#![allow(clippy::unwrap_used, reason = "a test may stop at the first surprise")]
 
 use geom_core::{
     DMat3, DVec2, DVec3, PolyMesh, QuadGrid, SurfaceJet, ThirdOrder, TriMesh, VertexId,

@@ -1,4 +1,5 @@
 //! What holds for any block, any problem and any names of unknowns.
+#![allow(clippy::unwrap_used, reason = "a test may stop at the first surprise")]
 
 use gp_solver::{
     BlockId, Checkpoint, Closeness, DualBlock, ElementFunction, Elements, Factorization,

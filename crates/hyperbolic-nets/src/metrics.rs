@@ -23,7 +23,7 @@ const SAME_SHAPE: f64 = 1e-3;
 /// let net = QuadNet::new(&PolyMesh::new(model.positions, &model.quads)?)?;
 /// let metrics = solve(&Input::new(&net), &Options::default(), &mut ())?.metrics;
 /// assert_eq!((metrics.faces, metrics.vertices, metrics.irregular_vertices), (36, 49, 0));
-/// assert!(metrics.star_planarity_max < 1e-9 && metrics.negative_curvature_percent > 99.0);
+/// assert!(metrics.star_planarity_max < 1e-9 && metrics.kink_max_deg < 1e-9 && metrics.folds == 0);
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 #[derive(Clone, Debug, PartialEq, Serialize)]

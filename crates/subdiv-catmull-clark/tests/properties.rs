@@ -1,4 +1,5 @@
 //! What holds for any control mesh: polygons of any valence, open and closed, with creases.
+#![allow(clippy::unwrap_used, reason = "a test may stop at the first surprise")]
 
 use geom_core::{DMat3, DVec3, PolyMesh, VertexId};
 use proptest::collection::vec;
