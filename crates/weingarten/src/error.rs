@@ -51,6 +51,11 @@ pub enum Error {
          border; refit with levels, or leave the border free"
     )]
     NotClamped { direction: &'static str },
+    /// A start that cannot be compared with the surface.
+    #[error(
+        "the surface to start from has another domain, or is closed otherwise, than the surface; give a result made from this surface"
+    )]
+    OtherDomain,
     /// A combination that does not exist.
     #[error("{what} needs the reduced formulation; leave `formulation` at reduced")]
     NeedsReduced { what: &'static str },

@@ -10,6 +10,7 @@ use bspline::{BsplineSurface, Trim};
 pub struct Input<'a> {
     pub(crate) surface: &'a BsplineSurface,
     pub(crate) trim: Option<&'a Trim>,
+    pub(crate) start: Option<&'a BsplineSurface>,
 }
 
 impl<'a> Input<'a> {
@@ -31,12 +32,34 @@ impl<'a> Input<'a> {
     /// ```
     #[must_use]
     pub fn within(surface: &'a BsplineSurface, trim: Option<&'a Trim>) -> Self {
-        Self { surface, trim }
+        Self { surface, trim, start: None }
+    }
+
+    /// Begins at another surface over the same domain, a result of before perhaps: terms and
+    /// reference stay those of the surface, damping begins afresh.
+    ///
+    /// # Example
+    /// ```
+    /// use weingarten::{Input, Options, solve};
+    /// let roof = fixtures::surfaces::Shape::Roof.surface(8, 7, 4, 4);
+    /// let first = solve(&roof, &Options::default(), &mut ())?;
+    /// let further = solve(
+    ///     Input::from(&roof).starting_from(&first.result),
+    ///     &Options::default(),
+    ///     &mut (),
+    /// )?;
+    /// let end = |s: &weingarten::Solution| s.report.stages[0].solver.final_energy;
+    /// assert!(end(&further) <= end(&first));
+    /// # Ok::<(), weingarten::Error>(())
+    /// ```
+    #[must_use]
+    pub fn starting_from(self, start: &'a BsplineSurface) -> Self {
+        Self { start: Some(start), ..self }
     }
 }
 
 impl<'a> From<&'a BsplineSurface> for Input<'a> {
     fn from(surface: &'a BsplineSurface) -> Self {
-        Self { surface, trim: None }
+        Self { surface, trim: None, start: None }
     }
 }

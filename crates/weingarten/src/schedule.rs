@@ -39,7 +39,7 @@ impl<'a> Schedule<'a> {
         options: &Options,
     ) -> Result<Self, Error> {
         options.check()?;
-        let Input { surface, trim } = centred;
+        let Input { surface, trim, .. } = centred;
         if trim.is_some() && options.formulation == Formulation::Lifted {
             return Err(Error::NeedsReduced { what: "a trimmed surface" });
         }

@@ -126,6 +126,9 @@ pub fn solve_with<'a>(
     let place = given.surface.normalization()?;
     let centred = given.surface.translated(-place.center());
     let input = Input { surface: &centred, ..given };
+    if let Some(start) = given.start {
+        check_domain(given.surface, start)?;
+    }
     let schedule = Schedule::new(input, &place, options)?;
     let fingerprint = fingerprint(given, options);
     let resume = observer.resume();
@@ -145,7 +148,10 @@ pub fn solve_with<'a>(
         let resumed = resume.as_ref().filter(|c| c.stage == number);
         let origin = match (&done, resumed) {
             (_, Some(checkpoint)) => checkpoint.numbers("start", level.unknowns())?.to_vec(),
-            (None, None) => coordinates(&level.reference),
+            (None, None) => match given.start {
+                Some(start) => level.started(start, &place)?,
+                None => coordinates(&level.reference),
+            },
             (Some((.., working)), None) => coordinates(&level.refitted(working)?),
         };
         let solved = prepared(&level, options, &origin, extra)?;
@@ -259,6 +265,16 @@ fn finish(
     })
 }
 
+/// A start is compared with its reference parameter by parameter.
+fn check_domain(surface: &BsplineSurface, start: &BsplineSurface) -> Result<(), Error> {
+    let of = |s: &BsplineSurface| [s.knots_u().domain(), s.knots_v().domain()];
+    let closed = |s: &BsplineSurface| [s.knots_u().is_periodic(), s.knots_v().is_periodic()];
+    if of(surface) == of(start) && closed(surface) == closed(start) {
+        return Ok(());
+    }
+    Err(Error::OtherDomain)
+}
+
 /// Of everything a run depends on. More steps are no other run: a finished one may be taken further.
 fn fingerprint(input: Input<'_>, options: &Options) -> u64 {
     let surface = input.surface;
@@ -279,6 +295,9 @@ fn fingerprint(input: Input<'_>, options: &Options) -> u64 {
             }
             of = of.numbers(curve.weights().unwrap_or_default());
         }
+    }
+    for point in input.start.iter().flat_map(|start| start.control_points()) {
+        of = of.numbers(&point.to_array());
     }
     let options = Options { iterations: 0, ..options.clone() };
     of.text(&format!("{options:?}")).finish()

@@ -38,6 +38,9 @@ pub(crate) struct Weingarten {
     config: ConfigArgs,
     #[command(flatten)]
     checkpoint: CheckpointArgs,
+    /// Begin at this result of before: same terms and reference, fresh damping
+    #[arg(long, value_name = "RESULT")]
+    start: Option<PathBuf>,
     #[command(flatten)]
     ending: EndingArgs,
     #[command(flatten)]
@@ -56,9 +59,21 @@ impl Weingarten {
             .with_checkpoints(&self.checkpoint)?
             .with_systems(self.system.dump_system.as_deref())?;
         let (model, named) = read_surface(&self.input, &self.surface)?;
-        let input = Input::within(&named.surface, named.trim.as_ref());
+        let start = self
+            .start
+            .as_deref()
+            .map(|path| read_surface(path, &SurfaceArgs::default()))
+            .transpose()?
+            .map(|(_, start)| start.surface);
+        let mut input = Input::within(&named.surface, named.trim.as_ref());
+        if let Some(start) = &start {
+            input = input.starting_from(start);
+        }
         let solution = solve(input, &options, &mut watch).map_err(|e| match e {
             Error::Solver(e @ SolverError::ForeignCheckpoint { .. }) => watch.foreign(&e),
+            e @ Error::OtherDomain => {
+                refused::<Options>(self.start.as_deref().unwrap_or(&self.input), e)
+            }
             e => refused::<Options>(&self.input, e),
         })?;
         let mut outcome = outcome(&solution, &model.unit)?.with_input(&self.input);
