@@ -1,12 +1,12 @@
 //! Polynomial caps for the middle of an extraordinary vertex.
 //!
-//! A cap has one patch of bidegree five in each sector. Its outer edges and the derivatives across
+//! A cap has one patch of bidegree six in each sector. Its outer edges and the derivatives across
 //! them are those of the ring of bi-cubic patches around it. Two neighbours `p` and `q` join along
 //! their common edge by
 //!
 //! `p_v(u, 0) + q_u(0, u) = 2 cos(2π/n) (1 − u)² p_u(u, 0)`
 //!
-//! with an edge of degree four, so that tangent planes agree to the last digit wherever the control
+//! with an edge of degree five, so that tangent planes agree to the last digit wherever the control
 //! points are; the factor is that of a regular polygon of tangents at the vertex and vanishes twice
 //! at the ring, where neighbours join smoothly. What freedom is left brings the cap near to the
 //! subdivision surface by least squares, at places that correspond in the characteristic map: all
@@ -18,7 +18,7 @@ use geom_core::DVec3;
 use numerics::{Cholesky, Matrix};
 
 /// Degree of the caps in both directions.
-pub(super) const DEGREE: usize = 5;
+pub(super) const DEGREE: usize = 6;
 /// Control points in one direction.
 pub(super) const SIDE: usize = DEGREE + 1;
 /// Places in one direction of a sector at which the cap is to be near to the surface.
@@ -27,14 +27,15 @@ const PLACES: usize = 8;
 const CHECKS: usize = 11;
 /// Entries smaller than this share of the largest are rounding.
 const ROUNDING: f64 = 1e-9;
-/// Binomial coefficients of degrees up to five.
-const BINOMIAL: [[f64; 6]; 6] = [
-    [1.0, 0.0, 0.0, 0.0, 0.0, 0.0],
-    [1.0, 1.0, 0.0, 0.0, 0.0, 0.0],
-    [1.0, 2.0, 1.0, 0.0, 0.0, 0.0],
-    [1.0, 3.0, 3.0, 1.0, 0.0, 0.0],
-    [1.0, 4.0, 6.0, 4.0, 1.0, 0.0],
-    [1.0, 5.0, 10.0, 10.0, 5.0, 1.0],
+/// Binomial coefficients.
+const BINOMIAL: [[f64; 7]; 7] = [
+    [1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0],
+    [1.0, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0],
+    [1.0, 2.0, 1.0, 0.0, 0.0, 0.0, 0.0],
+    [1.0, 3.0, 3.0, 1.0, 0.0, 0.0, 0.0],
+    [1.0, 4.0, 6.0, 4.0, 1.0, 0.0, 0.0],
+    [1.0, 5.0, 10.0, 10.0, 5.0, 1.0, 0.0],
+    [1.0, 6.0, 15.0, 20.0, 15.0, 6.0, 1.0],
 ];
 
 /// The caps of a valence.
@@ -290,7 +291,7 @@ impl<'d> Joints<'d> {
         for k in 0..SIDE {
             self.push(&[(unknown(sector, k, 0), 1.0), (unknown(before, 0, k), -1.0)], &[]);
         }
-        // Of degree four: the fifth difference vanishes.
+        // Of one degree less: the last difference vanishes.
         let sign = |k: usize| if k % 2 == 0 { 1.0 } else { -1.0 };
         let differences: Vec<(usize, f64)> =
             (0..SIDE).map(|k| (unknown(sector, k, 0), sign(k) * BINOMIAL[DEGREE][k])).collect();
@@ -381,7 +382,8 @@ fn given_size(rows: &[Vec<f64>], unknowns: usize) -> f64 {
     rows.iter().flat_map(|row| &row[unknowns..]).fold(0.0, |m, x| m.max(x.abs()))
 }
 
-/// Bezier points of degree five of a span of a uniform cubic spline, by its four control points.
+/// Bezier points, in the degree of the cap, of a span of a uniform cubic spline by its four control
+/// points.
 fn raised_span() -> [[f64; 4]; SIDE] {
     const CUBIC: [[f64; 4]; 4] = [
         [1.0 / 6.0, 4.0 / 6.0, 1.0 / 6.0, 0.0],
@@ -389,43 +391,46 @@ fn raised_span() -> [[f64; 4]; SIDE] {
         [0.0, 2.0 / 6.0, 4.0 / 6.0, 0.0],
         [0.0, 1.0 / 6.0, 4.0 / 6.0, 1.0 / 6.0],
     ];
+    let raise = DEGREE - 3;
     std::array::from_fn(|k| {
         std::array::from_fn(|q| {
-            let weight = |i: usize| {
-                // Raised twice: the product with the constant of degree two.
-                let j = k as isize - i as isize;
-                if (0..=2).contains(&j) {
-                    BINOMIAL[3][i] * BINOMIAL[2][j as usize] / BINOMIAL[5][k]
-                } else {
-                    0.0
-                }
+            // The product with the constant of the degree that is missing.
+            let weight = |i: usize| match k.checked_sub(i) {
+                Some(j) if j <= raise => BINOMIAL[3][i] * BINOMIAL[raise][j] / BINOMIAL[DEGREE][k],
+                _ => 0.0,
             };
             (0..4).map(|i| weight(i) * CUBIC[i][q]).sum()
         })
     })
 }
 
-/// `2 cosine (1 − u)² b'(u)` in Bernstein form of degree five, by the control points of an edge `b`
-/// of degree four that is given in degree five.
+/// `2 cosine (1 − u)² b'(u)` in Bernstein form of the degree of the cap, by the control points of
+/// an edge `b` of one degree less that is given in the degree of the cap.
 fn bent(cosine: f64) -> [[f64; SIDE]; SIDE] {
-    // The points of degree four, from the ends towards the middle.
+    // The points of the lower degree, from the ends towards the middle.
+    let d = DEGREE as f64;
     let mut low = [[0.0; SIDE]; DEGREE];
     low[0][0] = 1.0;
-    low[1] = [-0.25, 1.25, 0.0, 0.0, 0.0, 0.0];
-    low[4][5] = 1.0;
-    low[3] = [0.0, 0.0, 0.0, 0.0, 1.25, -0.25];
-    // 5 c₂ = 2 l₁ + 3 l₂.
-    for j in 0..SIDE {
-        let c = if j == 2 { 5.0 } else { 0.0 };
-        low[2][j] = (c - 2.0 * low[1][j]) / 3.0;
+    for k in 1..DEGREE / 2 {
+        for j in 0..SIDE {
+            let given = if j == k { d } else { 0.0 };
+            low[k][j] = (given - k as f64 * low[k - 1][j]) / (d - k as f64);
+        }
+    }
+    low[DEGREE - 1][DEGREE] = 1.0;
+    for k in (DEGREE / 2 + 1..DEGREE).rev() {
+        for j in 0..SIDE {
+            let given = if j == k { d } else { 0.0 };
+            low[k - 1][j] = (given - (d - k as f64) * low[k][j]) / k as f64;
+        }
     }
     let mut out = [[0.0; SIDE]; SIDE];
     for (k, row) in out.iter_mut().enumerate() {
-        // The square has the one coefficient of index 0, the derivative four.
+        // The square has the one coefficient of index 0.
         let Some(pair) = low.get(k..k + 2) else { continue };
-        let weight = 2.0 * cosine * BINOMIAL[3][k] / BINOMIAL[5][k];
+        let weight = 2.0 * cosine * BINOMIAL[DEGREE - 2][k] / BINOMIAL[DEGREE][k];
         for j in 0..SIDE {
-            row[j] = weight * 4.0 * (pair[1][j] - pair[0][j]);
+            row[j] = weight * (d - 1.0) * (pair[1][j] - pair[0][j]);
         }
     }
     out

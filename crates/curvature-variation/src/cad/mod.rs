@@ -64,7 +64,7 @@ pub enum LimitPatchError {
 
 /// The Catmull-Clark limit surface of `mesh` as B-spline surfaces, nothing blended and nothing
 /// faired: exact bi-cubic patches, merged where they are of one ring, and around every
-/// extraordinary vertex a cap of one patch of bidegree five in each sector. Caps continue the
+/// extraordinary vertex a cap of one patch of bidegree six in each sector. Caps continue the
 /// tangent planes of the ring and of one another exactly; around each vertex there are as many
 /// rings, up to four, as bring the caps within `tolerance` of the surface, a share of the mean edge
 /// at the vertex after one refinement.
@@ -216,9 +216,9 @@ impl<'m> Maker<'m> {
                 self.out.surfaces.push(spans(self.cubic, [4, 4], |i, j| at(i - 1, j))?);
             }
         }
-        let quintic = Degree::new(DEGREE).map_err(SplinePatchError::from)?;
+        let sextic = Degree::new(DEGREE).map_err(SplinePatchError::from)?;
         for cap in caps {
-            let knots = KnotVector::clamped_uniform(quintic, SIDE);
+            let knots = KnotVector::clamped_uniform(sextic, SIDE);
             let knots = knots.map_err(SplinePatchError::from)?;
             let patch = BsplineSurface::new(knots.clone(), knots, cap.to_vec(), None);
             self.out.surfaces.push(patch.map_err(SplinePatchError::from)?);
