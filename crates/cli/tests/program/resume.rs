@@ -48,7 +48,6 @@ fn resumes_to_the_same_bytes(args: &[&str], extension: &str, other: &[&str]) {
             stops_within_a_second(&what, &|| stopped(&mut program(&keeping), after));
         }
     }
-    println!("{args:?}: {time:?}, interrupted {interrupted} times");
     assert!(interrupted >= 5, "{args:?}: only {interrupted} signals came in time");
     let names = fs::read_dir(folder.path()).expect("a folder").flatten();
     let temporary = names.filter(|e| e.file_name().to_string_lossy().starts_with('.')).count();
