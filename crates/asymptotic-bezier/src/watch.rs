@@ -113,6 +113,13 @@ impl<'w, 'e> Watch<'w, 'e> {
         self.stage = Stage::new(name, number, count).at(origin, unit);
     }
 
+    /// The stage that was begun last, its unknowns counted from a point of what is solved, which has
+    /// been moved to the origin already.
+    pub(crate) fn stage_from(&self, point: DVec3) -> Stage {
+        let Stage { origin, unit, .. } = self.stage;
+        self.stage.clone().at((DVec3::from_array(origin) + point).to_array(), unit)
+    }
+
     /// The stage that was begun last.
     pub(crate) fn stage(&self) -> &Stage {
         &self.stage

@@ -51,6 +51,13 @@ impl CurvatureStatistics {
         };
     }
 
+    /// The same statistics of a model that stands elsewhere.
+    #[must_use]
+    pub fn moved(self, by: DVec3) -> Self {
+        let moved = |b: BoundingBox| BoundingBox { min: b.min + by, max: b.max + by };
+        Self { bounding_box: self.bounding_box.map(moved), ..self }
+    }
+
     /// Adds area that may or may not have curvatures.
     pub fn add_area(&mut self, area: f64) {
         self.area += area;

@@ -89,7 +89,7 @@ impl Normalization {
         let ball = Ball::around(points).ok_or(NormalizationError::Empty)?;
         let size = ball.diameter();
         let distance = ball.center.length();
-        if size == 0.0 || size <= 4.0 * f64::EPSILON * distance {
+        if size == 0.0 || size <= 64.0 * f64::EPSILON * distance {
             let DVec3 { x, y, z } = points[0];
             return Err(NormalizationError::Point { x, y, z });
         }

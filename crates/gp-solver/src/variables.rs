@@ -339,10 +339,16 @@ impl Variables {
     }
 
     /// Says that the items of a group are points or vectors in space, whose components mean nothing
-    /// each by itself: they are damped alike, by the mean of their diagonal, so that a turned problem
-    /// takes turned steps.
+    /// each by itself. They are damped by their block of the normal matrix, or alike, by the mean of
+    /// its diagonal, where the scaling is the largest so far; so a turned problem takes turned steps.
     pub fn set_vectors(&mut self, group: Group) -> &mut Self {
         self.vectors.push(group);
+        self
+    }
+
+    /// Damps every component by its own diagonal again, as published methods do.
+    pub fn forget_vectors(&mut self) -> &mut Self {
+        self.vectors.clear();
         self
     }
 

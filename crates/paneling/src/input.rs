@@ -6,7 +6,7 @@ use crate::layout::tiling::Layout;
 use crate::mold::prices::PriceList;
 use crate::options::{Options, PANELS};
 use bspline::BsplineSurface;
-use geom_core::{DVec3, Normalization};
+use geom_core::DVec3;
 use gp_solver::Counts;
 
 /// What is to be panelled: a surface, or panels that are cut already; and what molds and panels
@@ -73,15 +73,18 @@ impl<'a> Input<'a> {
     /// for one without extent.
     pub fn panels(&self, options: &Options) -> Result<PanelSet, Error> {
         let (centred, center) = self.centred(options)?;
-        Ok(centred.translated(center))
+        Ok(centred.placed(center))
     }
 
     /// The panels moved to the origin, and by what they have been moved away from.
     pub(crate) fn centred(&self, options: &Options) -> Result<(PanelSet, DVec3), Error> {
         let (surface, layout) = match self.cut {
             Cut::Panels(panels) => {
-                let center = Normalization::of(&panels.samples.points)?.center();
-                return Ok((panels.clone().translated(-center), center));
+                // Panels are made by `PanelSet::new` only, which keeps them at the origin too.
+                return Ok(match &panels.at_origin {
+                    Some((centred, center)) => (PanelSet::clone(centred), *center),
+                    None => (panels.clone(), DVec3::ZERO),
+                });
             }
             Cut::Surface(surface, layout) => (surface, layout),
         };

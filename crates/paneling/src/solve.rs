@@ -193,7 +193,7 @@ fn run(
     };
     // Measured where rounding is small, then moved to where the design stands.
     let back = |paneling: Paneling| paneling.translated(center);
-    let (result, grid, panels) = (back(result), grid.map(back), panels.translated(center));
+    let (result, grid, panels) = (back(result), grid.map(back), panels.placed(center));
     Ok(Solution { result, panels, metrics, grid, report, fits })
 }
 

@@ -180,7 +180,7 @@ proptest! {
             largest = largest.max(surface.point(u, v).distance(solution.result.point(u, v)));
         }
         let percent = 100.0 * largest / low.distance(high);
-        near(solution.metrics.deviation_max_percent, percent, percent)?;
+        near(solution.metrics.deviation_max_percent_box, percent, percent)?;
     }
 }
 

@@ -9,7 +9,7 @@ use crate::outcome::{Outcome, Status};
 use crate::report_support;
 use curvature_variation::{Rings, SurfaceAnalysis, fitted_torus};
 use exchange::{Mesh, Model};
-use geom_core::{CurvatureStatistics, ValueRange, mesh_curvature_statistics};
+use geom_core::{CurvatureStatistics, DVec3, Normalization, ValueRange, mesh_curvature_statistics};
 use gp_solver::OptionValue;
 use serde::Serialize;
 use std::collections::BTreeMap;
@@ -63,8 +63,11 @@ impl Analyze {
             return Ok(outcome);
         }
         let rings = self.blend_rings.and_then(Rings::count);
+        // Near the origin nothing is lost to rounding.
+        let (centred, center) = centred(&model);
         let Measured { kind, statistics, subdivision, warnings } =
-            measure(&self.input, &model, rings)?;
+            measure(&self.input, &centred, rings)?;
+        let statistics = statistics.moved(center);
         let mut metrics = AnalyzeMetrics::new(kind, &statistics);
         metrics.subdivision = subdivision;
         if self.discrete_bending {
@@ -90,6 +93,26 @@ impl Analyze {
         }
         Ok(outcome)
     }
+}
+
+/// A model moved to the origin, and by what it has been moved away from. One that has no place of
+/// its own stays.
+fn centred(model: &Model) -> (Model, DVec3) {
+    let mut model = model.clone();
+    let mut points: Vec<DVec3> = Vec::new();
+    for named in &model.surfaces {
+        points.extend(named.surface.control_points());
+    }
+    model.meshes.iter().for_each(|mesh| points.extend(&mesh.positions));
+    model.grids.iter().for_each(|grid| points.extend(&grid.points));
+    let Ok(place) = Normalization::of(&points) else { return (model, DVec3::ZERO) };
+    let by = -place.center();
+    for named in &mut model.surfaces {
+        named.surface = named.surface.translated(by);
+    }
+    model.meshes.iter_mut().flat_map(|mesh| &mut mesh.positions).for_each(|p| *p += by);
+    model.grids.iter_mut().flat_map(|grid| &mut grid.points).for_each(|p| *p += by);
+    (model, place.center())
 }
 
 /// What an input is and what it measures.

@@ -79,9 +79,8 @@ impl Panel {
         self.check_outputs()?;
         self.report.check()?;
         let options = self.options.options(&self.config)?;
-        let mut watch = Watch::new(context, "panelling")
-            .of(&self.input)
-            .with_checkpoints(&self.checkpoint)?;
+        let mut watch =
+            Watch::new(context, "panelling").of(&self.input).with_checkpoints(&self.checkpoint)?;
         let (model, named) = read_surface(&self.input, &self.surface)?;
         let unit = model.unit;
         let layout = layout(self.options.file("layout"), &options, &named.surface)?;

@@ -98,7 +98,10 @@ fn faulty_surfaces() {
              lower the degree",
         ),
         // No area, and a pole.
-        (scene("2", [one, one, one], ""), "so it has no shape"),
+        (
+            scene("2", [one, one, one], ""),
+            "all points of the model are equal (1, 1, 1), so it has no shape",
+        ),
         (
             scene(
                 "2",

@@ -195,7 +195,11 @@ fn conversions_chain_without_loss() {
     ];
     for pair in steps.windows(2) {
         let output = umbilic(&["convert", pair[0], pair[1]]);
-        assert_eq!((code(&output), message(&output)), (0, String::new()), "{pair:?}");
+        // JSON holds no unit, which is said.
+        let without_unit = |line: &&str| !line.ends_with("its numbers are in m");
+        let said = message(&output);
+        let other: Vec<&str> = said.lines().filter(without_unit).collect();
+        assert_eq!((code(&output), other), (0, vec![]), "{pair:?}");
     }
     let surfaces = |file: &str| {
         let text = fs::read_to_string(root().join(file)).unwrap();

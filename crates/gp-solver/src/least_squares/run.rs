@@ -140,6 +140,7 @@ impl<'a> Run<'a> {
         let (factorizations_before, timings_before) = (system.factorizations(), system.timings());
         system.refresh(x);
         system.keep_scaling(false);
+        system.damp_by_blocks(!keeps_scaling(options));
         system.linearize(x)?;
         system.keep_scaling(keeps_scaling(options));
         let start = start_record(&system);
@@ -321,6 +322,7 @@ impl<'a> Run<'a> {
     #[must_use]
     pub fn into_parts(mut self) -> (System<'a>, Vec<f64>) {
         self.system.keep_scaling(false);
+        self.system.damp_by_blocks(false);
         (self.system, self.x)
     }
 

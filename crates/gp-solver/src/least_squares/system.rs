@@ -57,6 +57,8 @@ pub struct System<'a> {
     scaling: Vec<f64>,
     keeps_scaling: bool,
     vectors: VectorPlan,
+    /// Whether `D` has the blocks of the vectors, or the mean of their diagonals.
+    has_blocks: bool,
     terms: Vec<f64>,
     trial: Vec<f64>,
     shift: Vec<f64>,
@@ -114,7 +116,8 @@ impl<'a> System<'a> {
             diagonal: vec![0.0; n],
             scaling: vec![0.0; n],
             keeps_scaling: false,
-            vectors: VectorPlan::new(&problem, &plan),
+            vectors: VectorPlan::new(&problem, &plan, &factor),
+            has_blocks: false,
             terms: vec![0.0; problem.slots.len()],
             trial: vec![0.0; problem.slots.len()],
             shift: vec![0.0; n],
@@ -162,7 +165,7 @@ impl<'a> System<'a> {
         let id = self.problem.push(block);
         if !fits {
             (self.plan, self.factor) = NormalPlan::new(&self.problem, self.wanted)?;
-            self.vectors = VectorPlan::new(&self.problem, &self.plan);
+            self.vectors = VectorPlan::new(&self.problem, &self.plan, &self.factor);
             self.matrix = vec![0.0; self.factor.values_len()];
             self.forget_constant();
         }
@@ -291,6 +294,14 @@ impl<'a> System<'a> {
     /// Makes the scaling the running maximum of the diagonal from here on, or its last value.
     pub(crate) fn keep_scaling(&mut self, keep: bool) {
         self.keeps_scaling = keep;
+    }
+
+    /// Damps a vector by its block of the matrix from the next linearisation on: steps then are as
+    /// free in a direction that the terms leave open, whichever it is, as a coordinate of its own
+    /// would be. Only for scalings that follow the iterate, for the largest of several blocks is no
+    /// block.
+    pub(crate) fn damp_by_blocks(&mut self, blocks: bool) {
+        self.has_blocks = blocks && !self.vectors.is_empty();
     }
 
     /// Takes up a scaling from a checkpoint.
@@ -448,7 +459,11 @@ impl<'a> System<'a> {
             // Exact Hessians of energies can have negative diagonals.
             self.diagonal[i] = if a != 0.0 { a.abs() } else { 1.0 / (size * size) };
         }
-        self.vectors.average(&mut self.diagonal);
+        if self.has_blocks {
+            self.vectors.take(&self.matrix);
+        } else {
+            self.vectors.average(&mut self.diagonal);
+        }
         for (scaling, &diagonal) in self.scaling.iter_mut().zip(&self.diagonal) {
             let least = if self.keeps_scaling { *scaling } else { 0.0 };
             *scaling = diagonal.max(least);
@@ -488,7 +503,7 @@ impl<'a> System<'a> {
         for (s, &d) in self.shift.iter_mut().zip(&self.scaling) {
             *s = damping * d;
         }
-        self.shifted_step()
+        self.shifted_step(damping)
     }
 
     /// The damping that would make the last [damped step](Self::damped_step), taken with
@@ -497,11 +512,15 @@ impl<'a> System<'a> {
     #[must_use]
     pub fn damping_for_radius(&mut self, damping: f64, radius: f64) -> f64 {
         let begin = Instant::now();
-        let mut image: Vec<f64> = self.step.iter().zip(&self.scaling).map(|(s, d)| s * d).collect();
-        let square: f64 = image.iter().zip(&self.step).map(|(a, b)| a * b).sum();
+        let mut scaled: Vec<f64> =
+            self.step.iter().zip(&self.scaling).map(|(s, d)| s * d).collect();
+        if self.has_blocks {
+            self.vectors.add_cross(&self.step, &mut scaled);
+        }
+        let square: f64 = scaled.iter().zip(&self.step).map(|(a, b)| a * b).sum();
+        let mut image = scaled.clone();
         self.factor.solve_in_place(&mut image);
-        let bend: f64 =
-            (self.step.iter().zip(&self.scaling).zip(&image)).map(|((s, d), w)| s * d * w).sum();
+        let bend: f64 = scaled.iter().zip(&image).map(|(d, w)| d * w).sum();
         self.timings.solve += begin.elapsed();
         let norm = square.sqrt();
         (damping + (norm - radius) / radius * square / bend).max(0.0)
@@ -520,13 +539,20 @@ impl<'a> System<'a> {
         for (s, &i) in self.shift.iter_mut().zip(&self.plan.variable) {
             *s = (epsilon / self.problem.variables.sizes()[i]).powi(2);
         }
-        self.shifted_step()
+        self.shifted_step(0.0)
     }
 
-    fn shifted_step(&mut self) -> Result<StepModel, SolverError> {
+    /// The step with the shift on the diagonal and `damping` times the rest of the blocks.
+    fn shifted_step(&mut self, damping: f64) -> Result<StepModel, SolverError> {
         let begin = Instant::now();
         self.factorizations += 1;
+        if self.has_blocks {
+            self.vectors.put(&mut self.matrix, 1.0 + damping);
+        }
         let result = self.factor.factor(&self.matrix, &self.shift);
+        if self.has_blocks {
+            self.vectors.put(&mut self.matrix, 1.0);
+        }
         self.timings.factor += begin.elapsed();
         if let Err(error) = result {
             return Err(match error {
@@ -550,7 +576,12 @@ impl<'a> System<'a> {
             decrease += 0.5 * s * (self.shift[i] * s - self.gradient[i]);
             square += self.scaling[i] * s * s;
         }
-        Ok(StepModel { predicted_decrease: decrease, scaled_norm: square.sqrt() })
+        if self.has_blocks {
+            let cross = self.vectors.cross(&self.step);
+            decrease += 0.5 * damping * cross;
+            square += cross;
+        }
+        Ok(StepModel { predicted_decrease: decrease, scaled_norm: square.max(0.0).sqrt() })
     }
 
     /// `out = x + step`, fixed unknowns unchanged.
@@ -568,7 +599,12 @@ impl<'a> System<'a> {
     #[must_use]
     pub fn scaled_norm(&self, x: &[f64]) -> f64 {
         let term = |(&i, &d): (&usize, &f64)| d * x[i] * x[i];
-        self.plan.variable.iter().zip(&self.scaling).map(term).sum::<f64>().sqrt()
+        let mut square: f64 = self.plan.variable.iter().zip(&self.scaling).map(term).sum();
+        if self.has_blocks {
+            let by_position: Vec<f64> = self.plan.variable.iter().map(|&i| x[i]).collect();
+            square += self.vectors.cross(&by_position);
+        }
+        square.max(0.0).sqrt()
     }
 
     /// `max_i |g_i| / √(A_ii · 2E)`, 0 where the energy is. Of a
@@ -586,8 +622,10 @@ impl<'a> System<'a> {
         }
         let mut squares: Vec<f64> = self.gradient.iter().map(|g| g * g).collect();
         self.vectors.sum(&mut squares);
+        let mut diagonal = self.diagonal.clone();
+        self.vectors.average(&mut diagonal);
         let cosine = |(&g, &d): (&f64, &f64)| (g / (d * scale)).sqrt();
-        squares.iter().zip(&self.diagonal).map(cosine).fold(0.0, f64::max)
+        squares.iter().zip(&diagonal).map(cosine).fold(0.0, f64::max)
     }
 
     pub(super) fn plan(&self) -> &NormalPlan {

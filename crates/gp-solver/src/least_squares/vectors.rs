@@ -1,17 +1,22 @@
 //! Unknowns that are components of vectors in space.
 
 use super::normal::NormalPlan;
+use crate::linear::Factor;
 use crate::problem::Problem;
 
-/// The positions of the free components of every vector.
+/// The positions of the free components of every vector, and their couplings.
 #[derive(Default)]
 pub(super) struct VectorPlan {
     starts: Vec<usize>,
     positions: Vec<u32>,
+    /// Two components of one vector, and where the matrix has their product.
+    pairs: Vec<[u32; 3]>,
+    /// The products at the last linearisation.
+    products: Vec<f64>,
 }
 
 impl VectorPlan {
-    pub(super) fn new(problem: &Problem<'_>, plan: &NormalPlan) -> Self {
+    pub(super) fn new(problem: &Problem<'_>, plan: &NormalPlan, factor: &Factor) -> Self {
         let variables = &problem.variables;
         let mut this = Self::default();
         if variables.vectors().is_empty() {
@@ -22,16 +27,55 @@ impl VectorPlan {
         this.starts.push(0);
         for group in variables.vectors() {
             for item in 0..group.len() {
+                let begin = this.positions.len();
                 let components = (0..group.width()).map(|c| position[group.column(item, c)]);
                 this.positions.extend(components.filter(|&at| at != u32::MAX));
                 this.starts.push(this.positions.len());
+                let free = &this.positions[begin..];
+                for (k, &a) in free.iter().enumerate() {
+                    for &b in &free[..k] {
+                        if let Some(slot) = factor.slot(a as usize, b as usize) {
+                            this.pairs.push([a, b, slot as u32]);
+                        }
+                    }
+                }
             }
         }
+        this.products = vec![0.0; this.pairs.len()];
         this
     }
 
     pub(super) fn is_empty(&self) -> bool {
         self.positions.is_empty()
+    }
+
+    /// Takes up the products of a matrix.
+    pub(super) fn take(&mut self, matrix: &[f64]) {
+        for (product, &[.., slot]) in self.products.iter_mut().zip(&self.pairs) {
+            *product = matrix[slot as usize];
+        }
+    }
+
+    /// Puts the products into the matrix, times a factor.
+    pub(super) fn put(&self, matrix: &mut [f64], factor: f64) {
+        for (product, &[.., slot]) in self.products.iter().zip(&self.pairs) {
+            matrix[slot as usize] = product * factor;
+        }
+    }
+
+    /// The off-diagonal part of `vᵀ D v`, with `D` the blocks of the vectors.
+    pub(super) fn cross(&self, v: &[f64]) -> f64 {
+        let term =
+            |(product, &[a, b, _]): (&f64, &[u32; 3])| product * v[a as usize] * v[b as usize];
+        2.0 * self.products.iter().zip(&self.pairs).map(term).sum::<f64>()
+    }
+
+    /// Adds the off-diagonal part of `D v`.
+    pub(super) fn add_cross(&self, v: &[f64], out: &mut [f64]) {
+        for (product, &[a, b, _]) in self.products.iter().zip(&self.pairs) {
+            out[a as usize] += product * v[b as usize];
+            out[b as usize] += product * v[a as usize];
+        }
     }
 
     /// Replaces the values of the components of every vector by their sum.
@@ -56,10 +100,10 @@ impl VectorPlan {
 
 #[cfg(test)]
 mod tests {
-    use crate::{Options, Problem, QuadraticBuilder, Run, Step, System, Variables};
+    use crate::{DampingRule, Options, Problem, QuadraticBuilder, Run, Step, System, Variables};
 
     /// A point on two unit spheres and nearly on a third, in axes turned about z by `angle`.
-    fn steps(angle: f64) -> Vec<[f64; 3]> {
+    fn steps(angle: f64, damping_rule: DampingRule) -> Vec<[f64; 3]> {
         let (sin, cos) = angle.sin_cos();
         let turn = |[x, y, z]: [f64; 3]| [cos * x - sin * y, sin * x + cos * y, z];
         let mut variables = Variables::new();
@@ -80,7 +124,8 @@ mod tests {
         problem.add(spheres.build());
         let system = System::new(problem, crate::Factorization::Auto).unwrap();
         let start = turn([2.0, 1.5, -3.0]);
-        let mut run = Run::new(system, &start, &Options::default()).unwrap();
+        let options = Options { damping_rule, ..Options::default() };
+        let mut run = Run::new(system, &start, &options).unwrap();
         let mut seen = Vec::new();
         while seen.len() < 12 && run.step(&mut ()).unwrap() == Step::Taken {
             let x = run.x();
@@ -91,12 +136,14 @@ mod tests {
 
     #[test]
     fn a_turned_problem_takes_turned_steps() {
-        let straight = steps(0.0);
-        for angle in [0.7, 2.0] {
-            let turned = steps(angle);
-            assert_eq!(turned.len(), straight.len());
-            for (a, b) in straight.iter().flatten().zip(turned.iter().flatten()) {
-                assert!((a - b).abs() < 1e-9, "{a} {b}");
+        for rule in [DampingRule::StepLength, DampingRule::Fivefold] {
+            let straight = steps(0.0, rule);
+            for angle in [0.7, 2.0] {
+                let turned = steps(angle, rule);
+                assert_eq!(turned.len(), straight.len());
+                for (a, b) in straight.iter().flatten().zip(turned.iter().flatten()) {
+                    assert!((a - b).abs() < 1e-9, "{a} {b}");
+                }
             }
         }
     }

@@ -8,6 +8,7 @@ use geom_core::{BoundingBox, SurfaceJet, principal_curvatures};
 use glam::{DMat3, DVec3};
 use rayon::prelude::*;
 use std::collections::HashMap;
+use std::sync::Arc;
 
 /// Points at which a seam is measured, both ends included.
 pub const SEAM_SAMPLES: usize = 5;
@@ -93,6 +94,8 @@ pub struct PanelSet {
     pub(crate) middles: Vec<[f64; 2]>,
     /// Corners of the panels in the domain.
     pub(crate) corners: Vec<Vec<[f64; 2]>>,
+    /// The same panels at the origin, where they were cut, and where that is in the model.
+    pub(crate) at_origin: Option<(Arc<PanelSet>, DVec3)>,
 }
 
 /// An edge of the layout, as its first panel sees it.
@@ -109,7 +112,13 @@ impl PanelSet {
     /// [`Error::Singular`] where the surface has no normal, [`Error::Size`] for one without extent.
     pub fn new(surface: &BsplineSurface, layout: &Layout) -> Result<Self, Error> {
         let (centred, center) = Self::centred(surface, layout)?;
-        Ok(centred.translated(center))
+        Ok(centred.placed(center))
+    }
+
+    /// The panels back where they stand in the model.
+    pub(crate) fn placed(self, center: DVec3) -> Self {
+        let at_origin = Some((Arc::new(self.clone()), center));
+        Self { at_origin, ..self.translated(center) }
     }
 
     /// The panels moved to the origin, and by what they have been moved away from.
@@ -209,6 +218,7 @@ impl PanelSet {
             diagonal,
             middles,
             corners,
+            at_origin: None,
         })
     }
 
