@@ -273,7 +273,8 @@ impl<'a> Reduced<'a> {
         y: &[f64],
         watch: &mut Watch<'_, '_>,
     ) -> Result<Option<Vec<FilledPatch>>, Error> {
-        let stage = watch.stage_from(self.joint.net.positions[0]);
+        let origin = self.joint.net.positions[0];
+        let stage = watch.stage_from(origin);
         let (mut problem, points, planes) = self.problem();
         let before = Shape::of(&problem);
         watch.extend(&stage, &mut problem)?;
