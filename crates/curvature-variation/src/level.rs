@@ -216,7 +216,7 @@ pub(crate) fn solve_level(
 }
 
 /// Whether a level that has stopped gaining stands at a minimum: `Converged` only if a Gauss-Newton
-/// step, whatever the method was, foresees no more than `tolerance` of the energy as gain either.
+/// step, whatever the method was, gains no more than `tolerance` of the energy either.
 /// Energies that have all but vanished have nothing to gain.
 fn certified(
     level: &mut Conditioned<'_>,
@@ -229,7 +229,7 @@ fn certified(
     if energy <= VANISHED * initial_energy.abs() {
         return Ok(Status::Converged);
     }
-    let gain = level.foreseen_gain(&state.y, observer)?;
+    let gain = level.gain_left(&state.y, observer)?;
     Ok(match gain {
         Some(gain) if gain <= tolerance * energy => Status::Converged,
         Some(_) => Status::Stalled,

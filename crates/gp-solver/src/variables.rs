@@ -346,12 +346,6 @@ impl Variables {
         self
     }
 
-    /// Damps every component by its own diagonal again, as published methods do.
-    pub fn forget_vectors(&mut self) -> &mut Self {
-        self.vectors.clear();
-        self
-    }
-
     /// The groups whose items are points or vectors.
     #[must_use]
     pub fn vectors(&self) -> &[Group] {

@@ -41,7 +41,6 @@ pub(crate) fn bordered(
 ) -> Result<(Variables, Group), Error> {
     let mut variables = Variables::new();
     let points = variables.add_grid(CONTROL_POINTS, [surface.n_u(), surface.n_v()], 3);
-    variables.set_vectors(points);
     if border != Border::Free {
         for (direction, knots) in [("u", surface.knots_u()), ("v", surface.knots_v())] {
             if !knots.is_periodic() && !knots.is_clamped() {

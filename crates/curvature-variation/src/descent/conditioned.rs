@@ -14,6 +14,8 @@ const MENDINGS: usize = 12;
 
 /// Weight of the Sobolev norm where nothing is to be steered, only judged.
 const CERTIFYING: f64 = 1e-6;
+/// Parts of the step that are tried.
+const SHARES: [f64; 4] = [1.0, 0.3, 0.1, 0.03];
 
 /// What a step stands on.
 pub(crate) struct Conditioned<'a> {
@@ -109,9 +111,11 @@ impl<'a> Conditioned<'a> {
         Ok(Ok(0))
     }
 
-    /// What is left to gain from `y` as a Gauss-Newton step with hardly any damping foresees it,
-    /// `½ gᵀM⁻¹g` with the gradient on the conditions; none if it was stopped, or without a matrix.
-    pub(crate) fn foreseen_gain(
+    /// What is left to gain from `y`: what a Gauss-Newton step with hardly any damping foresees,
+    /// `½ gᵀM⁻¹g` with the gradient on the conditions, or what a part of that step really brings,
+    /// whichever is less (where the matrix is all but singular it foresees anything). None if it was
+    /// stopped, or without a matrix.
+    pub(crate) fn gain_left(
         &mut self,
         y: &[f64],
         observer: &mut dyn Observer,
@@ -121,7 +125,7 @@ impl<'a> Conditioned<'a> {
         }
         self.energy.refresh(y);
         let mut gradient = vec![0.0; y.len()];
-        self.energy.value(y, &mut gradient);
+        let energy = self.energy.value(y, &mut gradient);
         let rows = self.condition_rows(y);
         self.keep(Vec::new(), false);
         if self.factor(y, true, CERTIFYING, observer)?.is_err() {
@@ -131,7 +135,15 @@ impl<'a> Conditioned<'a> {
         self.keep(rows, true);
         let mut step = gradient.clone();
         self.steering.apply_inverse(&mut step);
-        Ok(Some(0.5 * dot(&gradient, &step)))
+        let foreseen = 0.5 * dot(&gradient, &step);
+        let mut unused = vec![0.0; y.len()];
+        let mut brought = |share: f64| {
+            let trial: Vec<f64> = y.iter().zip(&step).map(|(y, s)| y - share * s).collect();
+            energy - self.energy.value(&trial, &mut unused)
+        };
+        // A step that leads where the energy is no number brings nothing.
+        let best = SHARES.iter().map(|&share| brought(share)).fold(0.0, f64::max);
+        Ok(Some(foreseen.min(best)))
     }
 
     /// Gives the level a matrix where its method needs none.
