@@ -12,9 +12,6 @@ const QUADRATIC: usize = 5;
 const CUBIC: usize = 9;
 /// A piece is fitted to at least this many neighbours per unknown.
 const NEIGHBOURS_PER_UNKNOWN: f64 = 1.3;
-/// Each term of a cubic has at least this share of its own, which those before it cannot explain;
-/// over three rows of vertices `x³` is `x² − x` but for their irregularity, and its coefficient noise.
-const OWN_SHARE: f64 = 0.01;
 
 /// What a mesh says about its surface at a vertex.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -31,9 +28,9 @@ pub struct VertexCurvature {
 /// without faces, or neighbours on a line). Computed in parallel.
 ///
 /// A cubic `z(x, y)` through the vertex is fitted to its neighbours within two rings, three on the
-/// border, over the plane of the mean face normal; a quadratic one if they are few or stand in few
-/// rows (Cazals and Pouget 2005). The error of the curvatures falls with the square of the edge
-/// length on a smooth surface, that of a quadratic with the edge length where it is one-sided.
+/// border, over the plane of the mean face normal; a quadratic one if they are few (Cazals and
+/// Pouget 2005). The error of the curvatures falls with the square of the edge length on a smooth
+/// surface. Strips of two faces across have too few rows for a cubic: do not trust theirs.
 ///
 /// # Example
 /// ```
@@ -163,14 +160,6 @@ fn solve(points: &[DVec3], unknowns: usize) -> Option<[f64; 5]> {
         heights.push(weight * p.z);
     }
     least_squares(&mut matrix, unknowns, &mut heights, 1).ok()?;
-    let triangle = |i: usize, j: usize| matrix[i * unknowns + j];
-    let has_own_share = |j: usize| {
-        let length = (0..=j).map(|i| triangle(i, j).powi(2)).sum::<f64>().sqrt();
-        triangle(j, j).abs() >= OWN_SHARE * length
-    };
-    if !(QUADRATIC..unknowns).all(has_own_share) {
-        return None;
-    }
     heights[..5].try_into().ok()
 }
 
@@ -246,21 +235,6 @@ mod tests {
         };
         let (coarse, fine) = (error(25), error(49));
         assert!(fine < 0.05 && coarse / fine > 3.0, "{coarse} {fine}");
-    }
-
-    #[test]
-    fn a_narrow_strip_of_a_cylinder_has_its_curvatures() {
-        // Three rows of vertices, a little off their places along the axis.
-        let mesh = grid(40, 3, |u, v| {
-            let angle = 2.0 * u;
-            DVec3::new(angle.cos(), angle.sin(), 0.1 * v + 1e-4 * (50.0 * (u + v)).sin())
-        });
-        // At the ends a quadratic sees three steps to one side only, and errs in their measure.
-        let step = 2.0 / 39.0;
-        for c in vertex_curvatures(&mesh) {
-            let c = c.unwrap();
-            assert!((c.mean.abs() - 0.5).abs() < step && c.gaussian.abs() < step, "{c:?}");
-        }
     }
 
     #[test]

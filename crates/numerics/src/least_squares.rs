@@ -18,9 +18,8 @@ pub struct RankError {
 /// Minimises `|A x − b|` for each of several right-hand sides at once.
 ///
 /// `a` is row-major, `rows × columns` with `rows ≥ columns`; `b` is row-major,
-/// `rows × right_hand_sides`. Both are overwritten; afterwards the first `columns` rows of `b` hold
-/// the solutions, and those of `a` the triangle of the factorisation on and above the diagonal.
-/// Reflections run from the first to the last nonzero of a column only, so
+/// `rows × right_hand_sides`. Both are overwritten; the first `columns` rows of `b` hold the
+/// solutions afterwards. Reflections run from the first to the last nonzero of a column only, so
 /// a banded matrix costs what a banded factorisation costs.
 ///
 /// # Errors
