@@ -17,7 +17,7 @@ use subdiv_catmull_clark::{
 /// Most rings of bi-cubic patches around a cap.
 const MOST_RINGS: usize = 4;
 /// Largest valence that has caps.
-const MOST_VALENCE: usize = 48;
+const MOST_VALENCE: usize = 32;
 
 /// B-spline surfaces that together are the limit surface of a control mesh, see [`limit_patches`].
 #[derive(Clone, Debug)]
