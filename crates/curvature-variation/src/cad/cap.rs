@@ -294,7 +294,7 @@ impl<'d> Joints<'d> {
             self.push(&[(unknown(sector, k, 0), 1.0), (unknown(before, 0, k), -1.0)], &[]);
         }
         // Of one degree less: the last difference vanishes.
-        let sign = |k: usize| if k % 2 == 0 { 1.0 } else { -1.0 };
+        let sign = |k: usize| if k.is_multiple_of(2) { 1.0 } else { -1.0 };
         let differences: Vec<(usize, f64)> =
             (0..SIDE).map(|k| (unknown(sector, k, 0), sign(k) * BINOMIAL[DEGREE][k])).collect();
         self.push(&differences, &[]);
