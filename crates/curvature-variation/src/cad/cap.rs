@@ -27,6 +27,8 @@ const PLACES: usize = 8;
 const CHECKS: usize = 11;
 /// Entries smaller than this share of the largest are rounding.
 const ROUNDING: f64 = 1e-9;
+/// Equations that follow from others leave no more than this, where the net has size one.
+const CONSISTENT: f64 = 1e-6;
 /// Binomial coefficients.
 const BINOMIAL: [[f64; 7]; 7] = [
     [1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0],
@@ -292,7 +294,7 @@ impl<'d> Joints<'d> {
             self.push(&[(unknown(sector, k, 0), 1.0), (unknown(before, 0, k), -1.0)], &[]);
         }
         // Of one degree less: the last difference vanishes.
-        let sign = |k: usize| if k % 2 == 0 { 1.0 } else { -1.0 };
+        let sign = |k: usize| if k.is_multiple_of(2) { 1.0 } else { -1.0 };
         let differences: Vec<(usize, f64)> =
             (0..SIDE).map(|k| (unknown(sector, k, 0), sign(k) * BINOMIAL[DEGREE][k])).collect();
         self.push(&differences, &[]);
@@ -323,63 +325,52 @@ impl<'d> Joints<'d> {
         self.push(&[(unknown(0, 0, 0), 1.0)], &points);
     }
 
-    /// Elimination with complete pivoting, since some equations follow from others.
+    /// Elimination of the largest unknown of every equation; some equations follow from others.
     fn solve(self) -> Option<Solved> {
         let (unknowns, columns) = (self.valence * SIDE * SIDE, self.data.cols());
         let mut rows: Vec<Vec<f64>> =
             self.left.into_iter().zip(self.right).map(|(l, r)| [l, r].concat()).collect();
         let mut pivots: Vec<usize> = Vec::new();
         let mut is_pivot = vec![false; unknowns];
-        let mut first = 0.0_f64;
-        for done in 0..rows.len() {
-            let mut best = (0.0, done, 0);
-            for (i, row) in rows.iter().enumerate().skip(done) {
-                for (j, value) in row[..unknowns].iter().enumerate() {
-                    if value.abs() > best.0 {
-                        best = (value.abs(), i, j);
-                    }
-                }
+        let (mut first, mut rest) = (0.0_f64, 0.0_f64);
+        let mut done = 0;
+        while done < rows.len() {
+            let size = |j: &usize| rows[done][*j].abs();
+            let largest = (0..unknowns).max_by(|a, b| size(a).total_cmp(&size(b)))?;
+            first = first.max(size(&largest));
+            if size(&largest) <= ROUNDING * first {
+                // What is left over must be fulfilled by itself.
+                let left = rows.remove(done);
+                rest = left[unknowns..].iter().fold(rest, |m, x| m.max(x.abs()));
+                continue;
             }
-            let (size, i, j) = best;
-            first = first.max(size);
-            if size <= ROUNDING * first {
-                break;
-            }
-            rows.swap(done, i);
-            let scale = rows[done][j].recip();
+            let scale = rows[done][largest].recip();
             rows[done].iter_mut().for_each(|x| *x *= scale);
             let pivot = std::mem::take(&mut rows[done]);
             for (k, row) in rows.iter_mut().enumerate() {
-                let factor = if k == done { 0.0 } else { row[j] };
+                let factor = if k == done { 0.0 } else { row[largest] };
                 if factor != 0.0 {
                     row.iter_mut().zip(&pivot).for_each(|(x, p)| *x -= factor * p);
-                    row[j] = 0.0;
+                    row[largest] = 0.0;
                 }
             }
             rows[done] = pivot;
-            pivots.push(j);
-            is_pivot[j] = true;
+            pivots.push(largest);
+            is_pivot[largest] = true;
+            done += 1;
         }
         let free: Vec<usize> = (0..unknowns).filter(|j| !is_pivot[*j]).collect();
-        let rank = pivots.len();
         let mut null = Matrix::zeros(unknowns, free.len());
         let mut given = Matrix::zeros(unknowns, columns);
-        for (row, j) in rows[..rank].iter().zip(&pivots) {
+        for (row, j) in rows.iter().zip(&pivots) {
             for (k, f) in free.iter().enumerate() {
                 null[(*j, k)] = -row[*f];
             }
             given.row_mut(*j).copy_from_slice(&row[unknowns..]);
         }
         free.iter().enumerate().for_each(|(k, f)| null[(*f, k)] = 1.0);
-        // What is left over must be fulfilled by itself.
-        let size = given_size(&rows[..rank], unknowns);
-        let rest = given_size(&rows[rank..], unknowns);
-        (rest <= 1e-6 * size.max(1.0)).then_some(Solved { null, given })
+        (rest <= CONSISTENT).then_some(Solved { null, given })
     }
-}
-
-fn given_size(rows: &[Vec<f64>], unknowns: usize) -> f64 {
-    rows.iter().flat_map(|row| &row[unknowns..]).fold(0.0, |m, x| m.max(x.abs()))
 }
 
 /// Bezier points, in the degree of the cap, of a span of a uniform cubic spline by its four control

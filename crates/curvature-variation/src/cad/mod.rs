@@ -10,6 +10,7 @@ use cap::{CapRule, DEGREE, SIDE};
 use geom_core::{DVec3, FaceId, HalfEdgeId, MeshError, PolyMesh, VertexId};
 use net::{COARSE, FINE, place};
 use std::collections::BTreeMap;
+use std::collections::btree_map::Entry;
 use subdiv_catmull_clark::{
     BasisId, Blend, Creases, SubdivisionError, SubdivisionSurface, refine, refinements_needed,
 };
@@ -17,7 +18,7 @@ use subdiv_catmull_clark::{
 /// Most rings of bi-cubic patches around a cap.
 const MOST_RINGS: usize = 4;
 /// Largest valence that has caps.
-const MOST_VALENCE: usize = 48;
+const MOST_VALENCE: usize = 32;
 
 /// B-spline surfaces that together are the limit surface of a control mesh, see [`limit_patches`].
 #[derive(Clone, Debug)]
@@ -182,12 +183,11 @@ impl<'m> Maker<'m> {
         if valence > MOST_VALENCE {
             return Err(too_many);
         }
-        if !self.rules.contains_key(&valence) {
-            let rule = CapRule::new(valence).ok_or(too_many)?;
-            self.rules.insert(valence, rule);
-        }
-        let rule = &self.rules[&valence];
         let allowed = self.tolerance * self.mean_edge(vertex);
+        let rule = match self.rules.entry(valence) {
+            Entry::Occupied(known) => known.into_mut(),
+            Entry::Vacant(place) => place.insert(CapRule::new(valence).ok_or(too_many)?),
+        };
         let mut net = local_net(self.mesh, vertex, valence);
         let (mut rings, mut reached) = (Vec::new(), f64::INFINITY);
         let mut caps = Vec::new();
@@ -230,12 +230,13 @@ impl<'m> Maker<'m> {
     fn add_fitted(&mut self, face: FaceId) -> Result<(), LimitPatchError> {
         let surface = self.surface;
         let patch = &surface.patches()[face.index()];
-        if !self.fits.contains_key(&patch.basis) {
-            self.fits.insert(patch.basis, FittedRule::new(surface, patch.basis)?);
-        }
+        let rule = match self.fits.entry(patch.basis) {
+            Entry::Occupied(known) => known.into_mut(),
+            Entry::Vacant(place) => place.insert(FittedRule::new(surface, patch.basis)?),
+        };
         let positions = self.mesh.positions();
         let control = |k: usize| positions[patch.controls[k] as usize];
-        let fitted = self.fits[&patch.basis].fit(&control);
+        let fitted = rule.fit(&control);
         let (fitted, deviation) = fitted.map_err(SplinePatchError::from)?;
         let vertex = self.mesh.origin(patch.corner);
         let share = deviation / self.mean_edge(vertex);

@@ -20,6 +20,8 @@ const POINT_BYTES: usize = 32;
 const LEAST_MEMORY: usize = 32 << 20;
 /// See [`LEAST_MEMORY`].
 const MEMORY_RATIO: usize = 12;
+/// Control points that the visit of a placed part counts as.
+const VISIT: usize = 16;
 /// Reasons for lost faces that are told in full.
 const MOST_REASONS: usize = 4;
 
@@ -255,7 +257,7 @@ impl<'a> Reader<'_, 'a> {
             return Err(ReadError::content(what, "export it again"));
         }
         // Parts that double at every level are too many even where they hold nothing.
-        self.take(1)?;
+        self.take(VISIT)?;
         path.push(group);
         for k in self.tree.members(group).collect::<Vec<_>>() {
             let name = self.tree.name(group).unwrap_or_default().to_owned();
