@@ -17,6 +17,15 @@ const CERTIFYING: f64 = 1e-6;
 /// Parts of the step that are tried.
 const SHARES: [f64; 4] = [1.0, 0.3, 0.1, 0.03];
 
+/// What is left to gain, and where.
+pub(crate) struct Left {
+    /// The energy now.
+    pub(crate) before: f64,
+    pub(crate) gain: f64,
+    /// The unknowns that bring it.
+    pub(crate) y: Vec<f64>,
+}
+
 /// What a step stands on.
 pub(crate) struct Conditioned<'a> {
     pub(crate) energy: LevelEnergy<'a>,
@@ -115,17 +124,17 @@ impl<'a> Conditioned<'a> {
     /// `½ gᵀM⁻¹g` with the gradient on the conditions, or what a part of that step really brings,
     /// whichever is less (where the matrix is all but singular it foresees anything). None if it was
     /// stopped, or without a matrix.
-    pub(crate) fn gain_left(
+    pub(crate) fn left(
         &mut self,
         y: &[f64],
         observer: &mut dyn Observer,
-    ) -> Result<Option<f64>, SolverError> {
+    ) -> Result<Option<Left>, SolverError> {
         if self.steering.metric.is_none() {
             return Ok(None);
         }
         self.energy.refresh(y);
         let mut gradient = vec![0.0; y.len()];
-        let energy = self.energy.value(y, &mut gradient);
+        let before = self.energy.value(y, &mut gradient);
         let rows = self.condition_rows(y);
         self.keep(Vec::new(), false);
         if self.factor(y, true, CERTIFYING, observer)?.is_err() {
@@ -136,14 +145,18 @@ impl<'a> Conditioned<'a> {
         let mut step = gradient.clone();
         self.steering.apply_inverse(&mut step);
         let foreseen = 0.5 * dot(&gradient, &step);
+        let mut left = Left { before, gain: 0.0, y: y.to_vec() };
         let mut unused = vec![0.0; y.len()];
-        let mut brought = |share: f64| {
+        for share in SHARES {
             let trial: Vec<f64> = y.iter().zip(&step).map(|(y, s)| y - share * s).collect();
-            energy - self.energy.value(&trial, &mut unused)
-        };
-        // A step that leads where the energy is no number brings nothing.
-        let best = SHARES.iter().map(|&share| brought(share)).fold(0.0, f64::max);
-        Ok(Some(foreseen.min(best)))
+            let gain = before - self.energy.value(&trial, &mut unused);
+            // A step that leads where the energy is no number brings nothing.
+            if gain > left.gain {
+                (left.gain, left.y) = (gain, trial);
+            }
+        }
+        left.gain = left.gain.min(foreseen);
+        Ok(Some(left))
     }
 
     /// Gives the level a matrix where its method needs none.
