@@ -93,7 +93,7 @@ impl Normalization {
             let DVec3 { x, y, z } = points[0];
             return Err(NormalizationError::Point { x, y, z });
         }
-        if !(size >= SIZES[0] && size <= SIZES[1]) {
+        if !(SIZES[0]..=SIZES[1]).contains(&size) {
             return Err(NormalizationError::Size { size });
         }
         let digits = (size / (f64::EPSILON * distance)).log10();

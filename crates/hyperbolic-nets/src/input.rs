@@ -71,7 +71,7 @@ impl<'a> Input<'a> {
     #[must_use]
     pub fn near_surface(net: &'a QuadNet, reference: &'a dyn ClosestPoint) -> Self {
         let this = Self::new(net);
-        let surface = this.place.clone().ok().map(|place| Placed { surface: reference, place });
+        let surface = this.place.ok().map(|place| Placed { surface: reference, place });
         Self { surface, ..this }
     }
 
@@ -86,7 +86,7 @@ impl<'a> Input<'a> {
     /// # Errors
     /// [`NormalizationError`] for a net without extent, too large, too small or too far away.
     pub fn place(&self) -> Result<Normalization, NormalizationError> {
-        self.place.clone()
+        self.place
     }
 
     /// The net in normalised coordinates.

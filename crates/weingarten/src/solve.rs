@@ -13,7 +13,7 @@ use crate::input::Input;
 use crate::level::Level;
 use crate::locus::RelationLocus;
 use crate::metrics::{Meter, Metrics};
-use crate::options::Options;
+use crate::options::{Formulation, Options};
 use crate::prepare::prepared;
 use crate::sampled::SampledSurface;
 use crate::schedule::Schedule;
@@ -127,6 +127,9 @@ pub fn solve_with<'a>(
     let centred = given.surface.translated(-place.center());
     let input = Input { surface: &centred, ..given };
     if let Some(start) = given.start {
+        if options.formulation == Formulation::Lifted {
+            return Err(Error::NeedsReduced { what: "a start" });
+        }
         check_domain(given.surface, start)?;
     }
     let schedule = Schedule::new(input, &place, options)?;
@@ -148,13 +151,14 @@ pub fn solve_with<'a>(
         let resumed = resume.as_ref().filter(|c| c.stage == number);
         let origin = match (&done, resumed) {
             (_, Some(checkpoint)) => checkpoint.numbers("start", level.unknowns())?.to_vec(),
-            (None, None) => match given.start {
-                Some(start) => level.started(start, &place)?,
-                None => coordinates(&level.reference),
-            },
+            (None, None) => coordinates(&level.reference),
             (Some((.., working)), None) => coordinates(&level.refitted(working)?),
         };
-        let solved = prepared(&level, options, &origin, extra)?;
+        let mut solved = prepared(&level, options, &origin, extra)?;
+        // The terms are those of the reference, wherever the run begins.
+        if let (None, None, Some(start)) = (&done, resumed, given.start) {
+            solved.x = level.started(start, &place)?;
+        }
         let system = System::new(solved.problem, solved.options.factorization)?;
         let mut run = Run::new(system, &solved.x, &solved.options)?;
         if let Some(checkpoint) = resumed {

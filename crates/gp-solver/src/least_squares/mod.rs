@@ -1,5 +1,6 @@
 //! Nonlinear least squares: Levenberg-Marquardt, guided projection, Gauss-Newton.
 
+mod finite;
 mod gram;
 mod inspect;
 mod levenberg;
