@@ -8,8 +8,8 @@ use hyperbolic_nets::{HyperbolicNet, PatchJet, QuadNet, SampledPatches};
 use std::path::{Path, PathBuf};
 
 /// Formats of the commands on nets.
-pub(crate) const NET_OUTPUTS: [&str; 9] =
-    ["ron", "step", "stp", "obj", "glb", "ply", "stl", "csv", "dxf"];
+pub(crate) const NET_OUTPUTS: [&str; 10] =
+    ["ron", "step", "stp", "3dm", "obj", "glb", "ply", "stl", "csv", "dxf"];
 
 /// What an input holds.
 pub(crate) enum NetInput {
@@ -93,7 +93,7 @@ pub(crate) fn encode(
         "ron" => exchange::write_net(&net_file(surface, unit))
             .map(String::into_bytes)
             .map_err(Failure::other),
-        "step" | "stp" => {
+        "step" | "stp" | "3dm" => {
             let mut surfaces = Vec::with_capacity(surface.shape().len());
             for (face, patch) in surface.patches().map_err(Failure::other)?.iter().enumerate() {
                 let surface = patch.to_surface().map_err(Failure::other)?;

@@ -10,6 +10,7 @@ use crate::model::Model;
 use crate::obj::{read_obj, write_obj};
 use crate::off::read_off;
 use crate::ply::{read_ply, write_ply};
+use crate::rhino::{read_3dm, write_3dm};
 use crate::sample::face_mesh;
 use crate::scene::{read_scene, write_scene};
 use crate::step::{read_step, write_step};
@@ -19,12 +20,12 @@ use std::borrow::Cow;
 use std::path::Path;
 
 /// Extensions that [`read_model`] knows.
-pub const READABLE: &str = "ron, step, stp, obj, ply, off, stl, glb, json";
-/// Coordinates GLB's single precision can hold, distances between them included.
+pub const READABLE: &str = "ron, step, stp, 3dm, obj, ply, off, stl, glb, json";
+/// Coordinates that single precision can hold, distances between them included.
 const SINGLE_PRECISION: f64 = 1e38;
 
 /// Extensions that [`encode_model`] knows.
-pub const WRITABLE: &str = "ron, step, stp, obj, ply, stl, glb, json, svg, dxf";
+pub const WRITABLE: &str = "ron, step, stp, 3dm, obj, ply, stl, glb, json, svg, dxf";
 
 /// Reads any file of geometry, by its extension.
 ///
@@ -46,6 +47,7 @@ pub fn decode_model(extension: &str, bytes: Vec<u8>) -> Result<Model, ReadError>
     match extension {
         "ron" => read_scene(&into_text(bytes)?),
         "step" | "stp" => read_step(&bytes),
+        "3dm" => read_3dm(&bytes),
         "obj" => read_obj(&into_text(bytes)?).map(of_mesh),
         "ply" => read_ply(&bytes),
         "off" => read_off(&into_text(bytes)?).map(|mesh| of_mesh((mesh, Vec::new()))),
@@ -97,6 +99,14 @@ pub fn encode_model(path: &Path, model: &Model) -> Result<Vec<u8>, WriteError> {
             let text = write_step(model).map_err(|e| unsupported("STEP", &e.to_string()))?;
             Ok(text.into_bytes())
         }
+        "3dm" => {
+            let is_empty = model.surfaces.is_empty() && model.grids.is_empty();
+            if is_empty && model.meshes.iter().all(|m| m.positions.is_empty()) {
+                return Err(unsupported("3DM", "a model without surfaces, meshes and points"));
+            }
+            no_far_meshes("3DM", &model.meshes)?;
+            write_3dm(model).map_err(|e| unsupported("3DM", &e.to_string()))
+        }
         "obj" => Ok(write_obj(&sampled(model)).into_bytes()),
         "ply" => Ok(write_ply(&sampled(model), &model.unit)),
         "stl" => {
@@ -108,10 +118,7 @@ pub fn encode_model(path: &Path, model: &Model) -> Result<Vec<u8>, WriteError> {
         }
         "glb" => {
             let meshes = sampled(model);
-            let far = |p: &DVec3| !(p.abs().max_element() < SINGLE_PRECISION);
-            if meshes.iter().any(|mesh| mesh.positions.iter().any(far)) {
-                return Err(unsupported("GLB", "coordinates of 1e38 and beyond"));
-            }
+            no_far_meshes("GLB", &meshes)?;
             Ok(write_glb(&meshes, &model.unit))
         }
         // COMPAS has meshes and surfaces, geomdl surfaces only: the plain one where it suffices.
@@ -158,6 +165,14 @@ fn of_mesh((mesh, warnings): (Mesh, Vec<String>)) -> Model {
 
 fn no_meshes(format: &'static str, model: &Model) -> Result<(), WriteError> {
     if model.meshes.is_empty() { Ok(()) } else { Err(unsupported(format, "meshes")) }
+}
+
+fn no_far_meshes(format: &'static str, meshes: &[Mesh]) -> Result<(), WriteError> {
+    let far = |p: &DVec3| !(p.abs().max_element() < SINGLE_PRECISION);
+    if meshes.iter().any(|mesh| mesh.positions.iter().any(far)) {
+        return Err(unsupported(format, "coordinates of 1e38 and beyond"));
+    }
+    Ok(())
 }
 
 fn unsupported(format: &'static str, what: &str) -> WriteError {

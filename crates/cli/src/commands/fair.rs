@@ -232,7 +232,7 @@ fn summary(result: &Solution, options: &Options) -> Vec<String> {
 
 /// Whether a file takes spline surfaces.
 fn is_spline_file(path: &Path) -> bool {
-    matches!(exchange::extension_of(path).as_str(), "step" | "stp" | "ron")
+    matches!(exchange::extension_of(path).as_str(), "step" | "stp" | "3dm" | "ron")
 }
 
 fn spline_summary(splines: &SplinePatches) -> String {

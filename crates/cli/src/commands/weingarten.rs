@@ -26,7 +26,7 @@ Examples:
       --levels 10x8,14x10,18x14,25x18 --metrics roof.json
 A relation `curve` takes its control points from a file too: --relation curve=FILE.ron.")]
 pub(crate) struct Weingarten {
-    /// File with a B-spline surface (RON, STEP)
+    /// File with a B-spline surface (RON, STEP, 3DM)
     input: PathBuf,
     #[command(flatten)]
     surface: SurfaceArgs,

@@ -1,6 +1,6 @@
 //! Writing meshes with colours, measured values and a material per group.
 
-use crate::color::{diverging, diverging_range, palette};
+use crate::color::{field_colors, palette};
 use crate::mesh::Mesh;
 use crate::triangulate::triangulate;
 use crate::unit::LengthUnit;
@@ -238,16 +238,5 @@ impl Glb {
             file.extend_from_slice(&self.bytes);
         }
         file
-    }
-}
-
-fn field_colors(mesh: &Mesh) -> Vec<[f32; 3]> {
-    let shown = mesh.vertex_fields.iter().find(|f| f.name == "K").or(mesh.vertex_fields.first());
-    match shown {
-        Some(field) if mesh.groups.is_empty() => {
-            let range = diverging_range(&field.values);
-            field.values.iter().map(|v| diverging(v / range)).collect()
-        }
-        _ => Vec::new(),
     }
 }

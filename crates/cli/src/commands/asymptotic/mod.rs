@@ -117,7 +117,7 @@ fn read_input(
         };
         return Ok((mesh.into(), unit));
     }
-    if exchange::extension_of(path) == "obj" {
+    if has_polylines(path) {
         let model = exchange::read_model(path).map_err(|e| refused(&e))?;
         let lines = model.meshes.iter().flat_map(|m| (0..m.lines.len()).map(|k| m.polyline(k)));
         let polylines: Vec<Vec<geom_core::DVec3>> = lines.map(Iterator::collect).collect();
@@ -133,6 +133,11 @@ fn read_input(
             .ok_or_else(|| refused(&format!("unknown unit `{symbol}`; use mm, cm, m or in")))?,
     };
     Ok((file.input().map_err(|e| refused(&e))?, unit))
+}
+
+/// Whether the format of a file has polylines.
+fn has_polylines(path: &Path) -> bool {
+    matches!(exchange::extension_of(path).as_str(), "obj" | "3dm")
 }
 
 /// The patches as clamped B-splines of one span.
@@ -153,7 +158,7 @@ fn surfaces(result: &Solution) -> Result<Vec<NamedSurface>, Failure> {
 /// Surfaces for every format, and the curves as polylines where the format has them.
 fn model_for(path: &Path, result: &Solution, unit: &LengthUnit) -> Result<Model, Failure> {
     let mut model = Model { unit: unit.clone(), surfaces: surfaces(result)?, ..Model::default() };
-    if exchange::extension_of(path) == "obj" {
+    if has_polylines(path) {
         model.meshes.push(curves_mesh(result));
     }
     Ok(model)
