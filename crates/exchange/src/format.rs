@@ -2,8 +2,9 @@
 
 use crate::drawing::{Drawing, DrawnLine, write_dxf, write_svg};
 use crate::error::{ReadError, WriteError};
-use crate::files::{into_text, read_bytes};
+use crate::files::{into_text, read_bytes, read_standard_input};
 use crate::glb::{read_glb, write_glb};
+use crate::guess::{Guess, guess, is_same};
 use crate::json::{read_json, write_compas, write_geomdl};
 use crate::mesh::Mesh;
 use crate::model::Model;
@@ -27,16 +28,53 @@ const SINGLE_PRECISION: f64 = 1e38;
 /// Extensions that [`encode_model`] knows.
 pub const WRITABLE: &str = "ron, step, stp, 3dm, obj, ply, stl, glb, json, svg, dxf";
 
-/// Reads any file of geometry, by its extension.
+/// The path that stands for standard input.
+pub const STANDARD_INPUT: &str = "-";
+
+/// Reads any file of geometry, by its extension; by its content where the extension is missing,
+/// unknown or certainly wrong, which a warning says. The path `-` is standard input.
 ///
 /// # Errors
 /// [`ReadError`] of the reader, or [`ReadError::UnknownFormat`].
 pub fn read_model(path: &Path) -> Result<Model, ReadError> {
-    let extension = extension_of(path);
-    if !is_listed(READABLE, &extension) {
-        return Err(ReadError::UnknownFormat { extension, known: READABLE });
+    read_model_as(path, None)
+}
+
+/// As [`read_model`], in a format of [`READABLE`] whatever name and content say.
+///
+/// # Errors
+/// As [`read_model`].
+pub fn read_model_as(path: &Path, format: Option<&str>) -> Result<Model, ReadError> {
+    if let Some(format) = format {
+        let format = format.to_lowercase();
+        if !is_listed(READABLE, &format) {
+            return Err(ReadError::UnknownFormat { extension: format, known: READABLE });
+        }
+        return decode_model(&format, input_bytes(path)?);
     }
-    decode_model(&extension, read_bytes(path)?)
+    let extension = if is_standard_input(path) { String::new() } else { extension_of(path) };
+    let known = is_listed(READABLE, &extension);
+    let bytes = input_bytes(path)?;
+    let (format, warning) = match guess(&bytes) {
+        Some(Guess::Sure(other)) if known && !is_same(&extension, other) => {
+            (other, Some(format!("the content is {} whatever the name says", other.to_uppercase())))
+        }
+        _ if known => (extension.as_str(), None),
+        Some(Guess::Sure(found) | Guess::Likely(found)) => (found, None),
+        None => return Err(ReadError::UnknownFormat { extension, known: READABLE }),
+    };
+    let mut model = decode_model(format, bytes)?;
+    model.warnings.extend(warning);
+    Ok(model)
+}
+
+/// Whether a path stands for standard input.
+fn is_standard_input(path: &Path) -> bool {
+    path.as_os_str() == STANDARD_INPUT
+}
+
+fn input_bytes(path: &Path) -> Result<Vec<u8>, ReadError> {
+    if is_standard_input(path) { read_standard_input() } else { read_bytes(path) }
 }
 
 /// Reads the bytes of a file with this (lower case) extension.
@@ -48,7 +86,7 @@ pub fn decode_model(extension: &str, bytes: Vec<u8>) -> Result<Model, ReadError>
         "ron" => read_scene(&into_text(bytes)?),
         "step" | "stp" => read_step(&bytes),
         "3dm" => read_3dm(&bytes),
-        "obj" => read_obj(&into_text(bytes)?).map(of_mesh),
+        "obj" => read_obj(&into_text(bytes)?),
         "ply" => read_ply(&bytes),
         "off" => read_off(&into_text(bytes)?).map(|mesh| of_mesh((mesh, Vec::new()))),
         "stl" => read_stl(&bytes).map(of_mesh),

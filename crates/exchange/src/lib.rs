@@ -21,13 +21,16 @@ mod error;
 mod files;
 mod format;
 mod glb;
+mod guess;
 mod json;
 mod mesh;
 mod model;
 mod net;
 mod obj;
+mod obj_freeform;
 mod off;
 mod ply;
+mod polyline;
 mod rhino;
 mod ron_text;
 mod sample;
@@ -37,6 +40,7 @@ mod segments;
 mod select;
 mod step;
 mod stl;
+mod text_number;
 mod triangulate;
 mod unit;
 mod wrapped;
@@ -46,7 +50,8 @@ pub use drawing::{Drawing, DrawnLine, Label, write_dxf, write_svg};
 pub use error::{ReadError, WriteError};
 pub use files::{check_writable, read_bytes, read_text, write_files, write_files_unless};
 pub use format::{
-    READABLE, WRITABLE, check_format, decode_model, encode_model, extension_of, read_model,
+    READABLE, STANDARD_INPUT, WRITABLE, check_format, decode_model, encode_model, extension_of,
+    read_model, read_model_as,
 };
 pub use glb::{read_glb, write_glb};
 pub use json::{read_json, write_compas, write_geomdl};

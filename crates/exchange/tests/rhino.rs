@@ -226,7 +226,7 @@ fn files_of_rhino_have_their_areas_in_closed_form() {
             [
                 "left out: 1 extrusion, 1 text dot; open the file with rhino3dm in Python or with \
                  Rhino and turn them into NURBS surfaces or meshes",
-                "1 curve became polylines with 8 pieces per knot span and degree",
+                "1 curve became polylines with 16 pieces per knot span",
             ]
         );
     }

@@ -15,9 +15,8 @@ use crate::color::linear;
 use crate::error::ReadError;
 use crate::mesh::Mesh;
 use crate::model::{Model, NamedSurface};
+use crate::polyline::{PIECES, is_polyline, points_of, points_on};
 use crate::unit::LengthUnit;
-use bspline::BsplineCurve;
-use geom_core::DVec3;
 use std::collections::BTreeMap;
 
 const HEAD: &[u8] = b"3D Geometry File Format ";
@@ -25,8 +24,6 @@ const HEAD: &[u8] = b"3D Geometry File Format ";
 const HEAD_LENGTH: usize = 32;
 /// Versions before this one have chunks of another kind.
 const OLDEST: u32 = 50;
-/// Pieces of a polyline in place of a curve per knot span and degree, if that is above 1.
-const PIECES: usize = 8;
 /// The colour is that of the object.
 const OWN_COLOR: u8 = 1;
 /// The object is a part of a block.
@@ -181,7 +178,7 @@ impl Reader {
             self.push_surface(attributes, NamedSurface::new("", surface));
         } else if is_curve(class) {
             let curve = curve_object(&mut whole, 0)?;
-            self.push_curve(attributes, &curve)?;
+            self.push_curve(attributes, &curve, &whole)?;
         } else {
             match *class {
                 BREP => {
@@ -240,16 +237,17 @@ impl Reader {
         self.model.meshes.push(Mesh { name, ..mesh });
     }
 
-    fn push_curve(&mut self, attributes: &Attributes, curve: &Curve) -> Result<(), Lost> {
+    fn push_curve(
+        &mut self,
+        attributes: &Attributes,
+        curve: &Curve,
+        at: &Cursor<'_>,
+    ) -> Result<(), Lost> {
         let spline = curve.whole()?;
-        let points = if spline.knots().degree().get() == 1 && spline.weights().is_none() {
-            spline.control_points().to_vec()
-        } else {
-            self.sampled += 1;
-            points_on(&spline)
-        };
+        self.budget.spend(points_of(&spline), at)?;
+        self.sampled += usize::from(!is_polyline(&spline));
         let mut mesh = Mesh::default();
-        mesh.push_polyline(&points);
+        mesh.push_polyline(&points_on(&spline));
         self.push_mesh(attributes, mesh);
         Ok(())
     }
@@ -270,9 +268,7 @@ impl Reader {
         }
         if self.sampled > 0 {
             let curves = counted(self.sampled, "curve");
-            warnings.push(format!(
-                "{curves} became polylines with {PIECES} pieces per knot span and degree"
-            ));
+            warnings.push(format!("{curves} became polylines with {PIECES} pieces per knot span"));
         }
         let Model { surfaces, meshes, .. } = &self.model;
         if surfaces.is_empty() && meshes.is_empty() {
@@ -341,17 +337,4 @@ fn attributes_of(mut data: Cursor<'_>) -> Result<Attributes, ReadError> {
         }
     }
     Ok(attributes)
-}
-
-/// Points on a curve at equal steps of every knot span.
-fn points_on(curve: &BsplineCurve) -> Vec<DVec3> {
-    let breaks = curve.knots().breaks();
-    let pieces = PIECES * curve.knots().degree().get();
-    let mut points = Vec::with_capacity(breaks.len() * pieces);
-    for pair in breaks.windows(2) {
-        let at = |k: usize| pair[0] + (pair[1] - pair[0]) * k as f64 / pieces as f64;
-        points.extend((0..pieces).map(|k| curve.point(at(k))));
-    }
-    points.extend(breaks.last().map(|t| curve.point(*t)));
-    points
 }
