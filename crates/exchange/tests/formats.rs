@@ -180,13 +180,13 @@ fn glb_faults_name_place_and_mend() {
             "accessor 0 has 4000000000 items outside its",
         ),
         (change("\"bufferView\":0", "\"bufferView\":77"), "`accessors[0].bufferview`: index out"),
-        (change("\"POSITION\":0", "\"POSITION\":50"), "`meshes[0].primitives[0].attributes"),
+        (change("\"POSITION\":0", "\"POSITION\":50"), "accessor 50 is named and not there"),
         (change("\"mesh\":0", "\"mesh\":3"), "`nodes[0].mesh`: index out"),
         (
             change("\"mesh\":0", "\"mesh\":0,\"children\":[0]"),
             "node 0 has two parents or is its own",
         ),
-        (change("\"nodes\":[0]", "\"nodes\":[4]"), "`scenes[0].nodes[0]`: index out"),
+        (change("\"nodes\":[1]", "\"nodes\":[4]"), "`scenes[0].nodes[0]`: index out"),
         (change("\"VEC3\"", "\"VEC9\""), "`accessors[0].type`: "),
         (change("\"componentType\":5126", "\"componentType\":1"), "`accessors[0].componenttype`: "),
         (

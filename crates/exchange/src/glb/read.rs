@@ -11,6 +11,7 @@ use crate::unit::LengthUnit;
 use geom_core::DVec3;
 use glam::{DMat4, DQuat};
 use gltf::json::Root;
+use gltf::json::validation::Checked::Valid;
 use gltf::json::validation::{Error as Fault, Validate};
 use gltf::mesh::Mode;
 use gltf::{Document, Semantic};
@@ -147,13 +148,23 @@ fn chunks(bytes: &[u8]) -> Result<(&str, &[u8]), ReadError> {
     }
 }
 
-/// Refuses what the library finds wrong, but for bounds that many exporters leave out.
+/// Refuses what the library finds wrong, but for bounds that many exporters leave out, and for
+/// primitives without positions, which are passed over.
 fn validate(root: &Root) -> Result<(), ReadError> {
+    // The library takes this number as it is.
+    let positions = Valid(Semantic::Positions);
+    let primitives = root.meshes.iter().flat_map(|m| &m.primitives);
+    for accessor in primitives.filter_map(|p| p.attributes.get(&positions)) {
+        if accessor.value() >= root.accessors.len() {
+            let what = format!("accessor {} is named and not there", accessor.value());
+            return Err(ReadError::content(what, MEND));
+        }
+    }
     let mut first = None;
     root.validate(root, gltf::json::Path::new, &mut |path, fault| {
         let path = path().to_string();
-        let bounds = path.ends_with(".min") || path.ends_with(".max");
-        if first.is_none() && !(bounds && matches!(fault, Fault::Missing)) {
+        let may_miss = [".min", ".max", "[\"POSITION\"]"].iter().any(|end| path.ends_with(end));
+        if first.is_none() && !(may_miss && matches!(fault, Fault::Missing)) {
             first = Some(format!("`{path}`: {fault}"));
         }
     });
