@@ -82,7 +82,7 @@ impl Panel {
         let options = self.options.options(&self.config)?;
         let mut watch =
             Watch::new(context, "panelling").of(&self.input).with_checkpoints(&self.checkpoint)?;
-        let (model, named) = read_surface(&self.input, &self.surface)?;
+        let (model, named) = read_surface(context, &self.input, &self.surface)?;
         let unit = model.unit;
         let layout = layout(self.options.file("layout"), &options, &named.surface)?;
         let prices = match &self.prices {

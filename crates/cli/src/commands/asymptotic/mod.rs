@@ -61,7 +61,7 @@ impl Asymptotic {
         options.check().map_err(|e| Failure::usage(said(&e)))?;
         let mut watch =
             Watch::new(context, "solving").of(&self.data).with_checkpoints(&self.checkpoint)?;
-        let (input, unit) = read_input(&self.data, &self.part, &options)?;
+        let (input, unit) = read_input(context, &self.data, &self.part, &options)?;
         let result = match solve(&input, &options, &mut watch) {
             Ok(result) => result,
             Err(Error::Interrupted { .. }) => {
@@ -97,6 +97,7 @@ impl Asymptotic {
 }
 
 fn read_input(
+    context: &Context,
     path: &Path,
     part: &PartArgs,
     options: &Options,
@@ -112,13 +113,14 @@ fn read_input(
             let net = exchange::read_net(&text).map_err(|e| refused(&e))?;
             (net.to_poly_mesh().map_err(|e| refused(&e))?, LengthUnit::default())
         } else {
-            let (mesh, unit, _) = crate::net_files::read_mesh(path, part)?;
+            let (mesh, unit, _) = crate::net_files::read_mesh(Some(context), path, part)?;
             (mesh, unit)
         };
         return Ok((mesh.into(), unit));
     }
     if has_polylines(path) {
-        let model = exchange::read_model(path).map_err(|e| refused(&e))?;
+        let format = context.input_format.as_deref();
+        let model = exchange::read_model_as(path, format).map_err(|e| refused(&e))?;
         let lines = model.meshes.iter().flat_map(|m| (0..m.lines.len()).map(|k| m.polyline(k)));
         let polylines: Vec<Vec<geom_core::DVec3>> = lines.map(Iterator::collect).collect();
         if polylines.is_empty() {
