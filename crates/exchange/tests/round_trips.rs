@@ -138,18 +138,6 @@ proptest! {
     }
 
     #[test]
-    fn trims_come_back_bit_for_bit(surface in surface(false), bulge in -0.1..0.1_f64) {
-        let trim = trim(&surface, bulge);
-        let named = NamedSurface { trim: Some(trim.clone()), ..NamedSurface::new("", surface) };
-        let model = Model { surfaces: vec![named], ..Model::default() };
-        for file in ["a.ron", "a.3dm"] {
-            let back = again(file, &model);
-            let found = back.surfaces[0].trim.as_ref().unwrap();
-            prop_assert_eq!(parameters(found), parameters(&trim), "{}", file);
-        }
-    }
-
-    #[test]
     fn meshes_come_back_bit_for_bit(points in prop::collection::vec(point(), 5..40)) {
         let n = points.len() as u32;
         let mut faces: Vec<Vec<u32>> = (2..n).map(|k| vec![k - 2, k - 1, k]).collect();
@@ -162,6 +150,23 @@ proptest! {
             };
             prop_assert_eq!(bits(&back), bits(&model), "{}", file);
             prop_assert_eq!(&back.meshes[0].faces, &model.meshes[0].faces, "{}", file);
+        }
+    }
+}
+
+proptest! {
+    // Edges in space are fitted, which takes a while on surfaces as wild as these.
+    #![proptest_config(ProptestConfig::with_cases(24))]
+
+    #[test]
+    fn trims_come_back_bit_for_bit(surface in surface(false), bulge in -0.1..0.1_f64) {
+        let trim = trim(&surface, bulge);
+        let named = NamedSurface { trim: Some(trim.clone()), ..NamedSurface::new("", surface) };
+        let model = Model { surfaces: vec![named], ..Model::default() };
+        for file in ["a.ron", "a.3dm"] {
+            let back = again(file, &model);
+            let found = back.surfaces[0].trim.as_ref().unwrap();
+            prop_assert_eq!(parameters(found), parameters(&trim), "{}", file);
         }
     }
 }
