@@ -3,10 +3,12 @@
 //! Open CASCADE evaluates every face of a STEP file on a grid of parameters; points, Gaussian and
 //! mean curvature and the areas of faces must agree with our own evaluation of the same file, which
 //! it must find to be one valid shell. geomdl does the same with
-//! points and derivatives of its own format. The glTF validator must find no error in a GLB file.
+//! points and derivatives of its own format. rhino3dm reads our 3DM files, and we read its own. The
+//! glTF validator must find no error in a GLB file.
 //! What is not installed is skipped by name.
 
 mod reading;
+mod rhino;
 mod verdict;
 
 use self::verdict::{Face, Verdict, ask};
@@ -146,9 +148,11 @@ pub(crate) fn run() -> Outcome {
     build_umbilic()?;
     let python = python_with("OCP");
     let geomdl = python_with("geomdl");
+    let rhino = python_with("rhino3dm");
     let node = node_with_validator();
     for (missing, name, wanted) in [
         (python.is_none(), "Open CASCADE", "a python3 (or UMBILIC_JUDGE_PYTHON) with OCP 7.9.3.1"),
+        (rhino.is_none(), "rhino3dm", "a python3 (or UMBILIC_JUDGE_PYTHON) with rhino3dm 8"),
         (geomdl.is_none(), "geomdl", "a python3 (or UMBILIC_JUDGE_PYTHON) with geomdl 5"),
         (node.is_none(), "the glTF validator", "node with gltf-validator on NODE_PATH"),
     ] {
@@ -158,6 +162,9 @@ pub(crate) fn run() -> Outcome {
     }
     if let Some(python) = &python {
         reading::judge(python)?;
+    }
+    if let Some(python) = &rhino {
+        rhino::judge(python)?;
     }
     for (k, case) in CASES.iter().enumerate() {
         let out = root().join("target/judges").join(k.to_string());

@@ -15,6 +15,10 @@ pub(crate) struct GlobalArgs {
     /// Number of threads (default: one per core); results do not depend on it
     #[arg(long, value_name = "N", global = true)]
     pub(crate) threads: Option<NonZeroUsize>,
+    /// Read the input as this format (ron, step, 3dm, obj, ply, off, stl, glb, json), whatever its
+    /// name and content say; an input `-` is standard input
+    #[arg(long, value_name = "FORMAT", global = true)]
+    pub(crate) input_format: Option<String>,
     /// Print no summary and no progress
     #[arg(short, long, global = true)]
     pub(crate) quiet: bool,

@@ -14,6 +14,8 @@ pub(crate) struct Context {
     pub(crate) threads: usize,
     /// Ctrl-C.
     pub(crate) interrupt: Arc<Interrupt>,
+    /// The format of the input, if it is said.
+    pub(crate) input_format: Option<String>,
     quiet: bool,
 }
 
@@ -27,7 +29,8 @@ impl Context {
         }
         pool.build_global().map_err(|e| Failure::other(format!("cannot start threads: {e}")))?;
         let interrupt = Interrupt::listen()?;
-        Ok(Self { threads: rayon::current_num_threads(), interrupt, quiet: global.quiet })
+        let (threads, input_format) = (rayon::current_num_threads(), global.input_format.clone());
+        Ok(Self { threads, interrupt, input_format, quiet: global.quiet })
     }
 
     /// A progress bar of `steps` steps on stderr; invisible unless stderr is a terminal.

@@ -1,6 +1,8 @@
 //! Files that are read, and what is taken of them.
 
+use crate::context::Context;
 use crate::failure::Failure;
+use bspline::BsplineSurface;
 use exchange::{Mesh, Model, NamedSurface, Pick, PickError};
 use std::path::Path;
 
@@ -20,21 +22,35 @@ pub(crate) struct PartArgs {
     pub(crate) part: Vec<Pick>,
 }
 
-/// The content of a file, as far as it is chosen.
-pub(crate) fn read(path: &Path, surface: &SurfaceArgs, part: &PartArgs) -> Result<Model, Failure> {
-    let mut model = exchange::read_model(path).map_err(|e| Failure::input(path, e))?;
+/// The content of the input, as far as it is chosen.
+pub(crate) fn read(
+    context: &Context,
+    path: &Path,
+    surface: &SurfaceArgs,
+    part: &PartArgs,
+) -> Result<Model, Failure> {
+    let format = context.input_format.as_deref();
+    let mut model = exchange::read_model_as(path, format).map_err(|e| Failure::input(path, e))?;
     model.select(&surface.surface, &part.part).map_err(|e| refused(path, &e))?;
     Ok(model)
 }
 
 /// The one chosen surface of a file, and its model, which keeps unit and warnings.
 pub(crate) fn read_surface(
+    context: &Context,
     path: &Path,
     surface: &SurfaceArgs,
 ) -> Result<(Model, NamedSurface), Failure> {
-    let model = read(path, surface, &PartArgs::default())?;
+    let model = read(context, path, surface, &PartArgs::default())?;
     let named = model.only_surface().map_err(|e| refused(path, &e))?.clone();
     Ok((model, named))
+}
+
+/// The one surface of a file beside the input.
+pub(crate) fn read_other_surface(path: &Path) -> Result<BsplineSurface, Failure> {
+    let model = exchange::read_model(path).map_err(|e| Failure::input(path, e))?;
+    let named = model.only_surface().map_err(|e| refused(path, &e))?;
+    Ok(named.surface.clone())
 }
 
 /// The one mesh of a model.

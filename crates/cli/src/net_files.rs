@@ -1,5 +1,6 @@
 //! Quad nets in and hyperbolic nets out, for the commands that work on them.
 
+use crate::context::Context;
 use crate::failure::Failure;
 use crate::input_file::{self, PartArgs, SurfaceArgs};
 use exchange::{Field, LengthUnit, Mesh, Model, NamedSurface, Net, Segment};
@@ -8,8 +9,8 @@ use hyperbolic_nets::{HyperbolicNet, PatchJet, QuadNet, SampledPatches};
 use std::path::{Path, PathBuf};
 
 /// Formats of the commands on nets.
-pub(crate) const NET_OUTPUTS: [&str; 9] =
-    ["ron", "step", "stp", "obj", "glb", "ply", "stl", "csv", "dxf"];
+pub(crate) const NET_OUTPUTS: [&str; 10] =
+    ["ron", "step", "stp", "3dm", "obj", "glb", "ply", "stl", "csv", "dxf"];
 
 /// What an input holds.
 pub(crate) enum NetInput {
@@ -21,11 +22,16 @@ pub(crate) enum NetInput {
 
 /// Reads a net file (`.ron`) or the one chosen mesh of a file.
 pub(crate) fn read(
+    context: &Context,
     path: &Path,
     part: &PartArgs,
 ) -> Result<(NetInput, LengthUnit, Vec<String>), Failure> {
     let refused = |e: &dyn std::fmt::Display| Failure::input(path, e);
-    if exchange::extension_of(path) == "ron" {
+    let is_net = match context.input_format.as_deref() {
+        Some(format) => format == "ron",
+        None => exchange::extension_of(path) == "ron",
+    };
+    if is_net {
         if !part.part.is_empty() {
             return Err(Failure::usage("--part has no meaning for a net file; leave it out"));
         }
@@ -44,16 +50,20 @@ pub(crate) fn read(
             HyperbolicNet::new(quads, normals, net.shape_parameters).map_err(|e| refused(&e))?;
         return Ok((NetInput::Net(Box::new(surface)), net.unit, Vec::new()));
     }
-    let (mesh, unit, warnings) = read_mesh(path, part)?;
+    let (mesh, unit, warnings) = read_mesh(Some(context), path, part)?;
     Ok((NetInput::Mesh(mesh), unit, warnings))
 }
 
-/// Reads the one chosen mesh of a file.
+/// Reads the one chosen mesh of the input, or of another file without a context.
 pub(crate) fn read_mesh(
+    context: Option<&Context>,
     path: &Path,
     part: &PartArgs,
 ) -> Result<(PolyMesh, LengthUnit, Vec<String>), Failure> {
-    let model = input_file::read(path, &SurfaceArgs::default(), part)?;
+    let model = match context {
+        Some(context) => input_file::read(context, path, &SurfaceArgs::default(), part)?,
+        None => exchange::read_model(path).map_err(|e| Failure::input(path, e))?,
+    };
     let mesh = input_file::only_mesh(path, &model)?;
     let mesh = mesh.to_poly_mesh().map_err(|e| Failure::input(path, e))?;
     Ok((mesh, model.unit, model.warnings))
@@ -93,7 +103,7 @@ pub(crate) fn encode(
         "ron" => exchange::write_net(&net_file(surface, unit))
             .map(String::into_bytes)
             .map_err(Failure::other),
-        "step" | "stp" => {
+        "step" | "stp" | "3dm" => {
             let mut surfaces = Vec::with_capacity(surface.shape().len());
             for (face, patch) in surface.patches().map_err(Failure::other)?.iter().enumerate() {
                 let surface = patch.to_surface().map_err(Failure::other)?;

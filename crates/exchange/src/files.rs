@@ -3,7 +3,7 @@
 use crate::error::{ReadError, WriteError};
 use std::ffi::OsString;
 use std::fs::{self, File, OpenOptions};
-use std::io::Write;
+use std::io::{Read, Write};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU64, Ordering};
 
@@ -17,6 +17,17 @@ pub fn read_bytes(path: &Path) -> Result<Vec<u8>, ReadError> {
         return Err(ReadError::NotAFile);
     }
     Ok(fs::read(path)?)
+}
+
+/// All bytes of standard input, up to 2 GiB.
+pub(crate) fn read_standard_input() -> Result<Vec<u8>, ReadError> {
+    const MOST: u64 = 2 << 30;
+    let mut bytes = Vec::new();
+    std::io::stdin().lock().take(MOST + 1).read_to_end(&mut bytes)?;
+    if bytes.len() as u64 > MOST {
+        return Err(ReadError::content("standard input does not end", "pass at most 2 GiB"));
+    }
+    Ok(bytes)
 }
 
 /// The text of a regular file.

@@ -21,13 +21,17 @@ mod error;
 mod files;
 mod format;
 mod glb;
+mod guess;
 mod json;
 mod mesh;
 mod model;
 mod net;
 mod obj;
+mod obj_freeform;
 mod off;
 mod ply;
+mod polyline;
+mod rhino;
 mod ron_text;
 mod sample;
 mod scale;
@@ -36,6 +40,7 @@ mod segments;
 mod select;
 mod step;
 mod stl;
+mod text_number;
 mod triangulate;
 mod unit;
 mod wrapped;
@@ -45,7 +50,8 @@ pub use drawing::{Drawing, DrawnLine, Label, write_dxf, write_svg};
 pub use error::{ReadError, WriteError};
 pub use files::{check_writable, read_bytes, read_text, write_files, write_files_unless};
 pub use format::{
-    READABLE, WRITABLE, check_format, decode_model, encode_model, extension_of, read_model,
+    READABLE, STANDARD_INPUT, WRITABLE, check_format, decode_model, encode_model, extension_of,
+    read_model, read_model_as,
 };
 pub use glb::{read_glb, write_glb};
 pub use json::{read_json, write_compas, write_geomdl};
@@ -55,6 +61,7 @@ pub use net::{Net, read_net, write_net};
 pub use obj::{read_obj, write_obj, write_obj_and_materials};
 pub use off::read_off;
 pub use ply::{read_ply, write_ply};
+pub use rhino::{read_3dm, write_3dm};
 pub use ron_text::{from_ron, read_ron, to_ron};
 pub use sample::{face_mesh, joined_mesh, surface_mesh};
 pub use scene::{read_scene, write_scene};

@@ -16,13 +16,15 @@ pub struct NamedSurface {
     pub trim: Option<Trim>,
     /// Linear RGB in 0..=1, if the file gives the face a colour.
     pub color: Option<[f32; 3]>,
+    /// The layer it stands on, in formats that have layers; may be empty.
+    pub layer: String,
 }
 
 impl NamedSurface {
     /// A whole surface without a colour.
     #[must_use]
     pub fn new(name: impl Into<String>, surface: BsplineSurface) -> Self {
-        Self { name: name.into(), surface, trim: None, color: None }
+        Self { name: name.into(), surface, trim: None, color: None, layer: String::new() }
     }
 
     /// Area and curvatures of the part that counts.

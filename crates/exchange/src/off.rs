@@ -2,7 +2,7 @@
 
 use crate::error::{ReadError, clip};
 use crate::mesh::Mesh;
-use crate::obj::coordinate;
+use crate::text_number::coordinate;
 use geom_core::DVec3;
 
 /// Reads an OFF file (also `COFF`, `NOFF`, `STOFF` and their combinations: extra numbers of

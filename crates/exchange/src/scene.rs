@@ -171,7 +171,7 @@ fn surface(text: SurfaceText, title: &str) -> Result<NamedSurface, ReadError> {
         ReadError::content(format!("{title}: {what}"), mend)
     })?;
     let color = text.color.map(|(r, g, b)| [r, g, b]);
-    Ok(NamedSurface { name: text.name, surface, trim, color })
+    Ok(NamedSurface { trim, color, ..NamedSurface::new(text.name, surface) })
 }
 
 fn trim(loops: Vec<Vec<TrimText>>, surface: &BsplineSurface) -> Result<Option<Trim>, TrimError> {

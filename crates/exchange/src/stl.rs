@@ -2,7 +2,7 @@
 
 use crate::error::ReadError;
 use crate::mesh::Mesh;
-use crate::obj::coordinate;
+use crate::text_number::coordinate;
 use crate::triangulate::triangulate;
 use geom_core::DVec3;
 use std::collections::HashMap;

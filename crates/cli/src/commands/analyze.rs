@@ -53,7 +53,7 @@ pub(crate) struct Analyze {
 impl Analyze {
     pub(crate) fn run(self, context: &Context) -> Result<Outcome, Failure> {
         self.report.check()?;
-        let model = input_file::read(&self.input, &self.surface, &self.part)?;
+        let model = input_file::read(context, &self.input, &self.surface, &self.part)?;
         if self.list {
             let listing = Listing::new(&model);
             let outcome = Outcome::new(Status::Converged, 0).with_input(&self.input);

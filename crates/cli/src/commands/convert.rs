@@ -48,7 +48,7 @@ impl Convert {
         exchange::check_format(&self.output).map_err(|e| Failure::input(&self.output, e))?;
         check_output_path(&self.output)?;
         self.report.check()?;
-        let mut model = input_file::read(&self.input, &self.surface, &self.part)?;
+        let mut model = input_file::read(context, &self.input, &self.surface, &self.part)?;
         if let Some(unit) = self.unit.clone() {
             model = model.in_unit(unit).map_err(|e| Failure::input(&self.input, e))?;
         }

@@ -59,7 +59,7 @@ impl Darboux {
         net_files::check_outputs(&self.output.output, &["glb", "obj", "ply", "stl"])?;
         let options = self.options()?;
         let mut watch = Watch::new(context, "net").of(&self.input);
-        let (input, unit, mut warnings) = net_files::read(&self.input, &self.part)?;
+        let (input, unit, mut warnings) = net_files::read(context, &self.input, &self.part)?;
         let (surface, status, steps) = match input {
             NetInput::Net(surface) => (*surface, Status::Converged, 0),
             NetInput::Mesh(mesh) => self.solve(&mesh, &mut watch, &mut warnings)?,

@@ -79,7 +79,7 @@ impl Fair {
         }
         let mut watch =
             Watch::new(context, "fairing").of(&self.input).with_checkpoints(&self.checkpoint)?;
-        let model = input_file::read(&self.input, &SurfaceArgs::default(), &self.part)?;
+        let model = input_file::read(context, &self.input, &SurfaceArgs::default(), &self.part)?;
         let input = self.read(&model)?;
         let mut result = solve(&input, &options, &mut watch).map_err(|e| match e {
             Error::Solver(e @ SolverError::ForeignCheckpoint { .. }) => watch.foreign(&e),
@@ -169,7 +169,7 @@ fn read_control_mesh(path: &Path, model: &Model) -> Result<geom_core::PolyMesh, 
 
 /// A further mesh of `--family`.
 fn read_member(path: &Path) -> Result<geom_core::PolyMesh, Failure> {
-    let model = input_file::read(path, &SurfaceArgs::default(), &PartArgs::default())?;
+    let model = exchange::read_model(path).map_err(|e| Failure::input(path, e))?;
     read_control_mesh(path, &model)
 }
 
@@ -232,7 +232,7 @@ fn summary(result: &Solution, options: &Options) -> Vec<String> {
 
 /// Whether a file takes spline surfaces.
 fn is_spline_file(path: &Path) -> bool {
-    matches!(exchange::extension_of(path).as_str(), "step" | "stp" | "ron")
+    matches!(exchange::extension_of(path).as_str(), "step" | "stp" | "3dm" | "ron")
 }
 
 fn spline_summary(splines: &SplinePatches) -> String {

@@ -60,7 +60,7 @@ impl Fit {
         self.report.check()?;
         let options = self.options.options(&self.config)?;
         let settings = settings(&options)?;
-        let model = input_file::read(&self.input, &SurfaceArgs::default(), &self.part)?;
+        let model = input_file::read(context, &self.input, &SurfaceArgs::default(), &self.part)?;
         let data = points(&self.input, &model)?;
         let fit = fit_grid(&data.points, data.n_u, data.n_v, data.closed_u, &settings)
             .map_err(|e| Failure::input(&self.input, e))?;

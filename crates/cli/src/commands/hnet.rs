@@ -56,16 +56,16 @@ impl Hnet {
             .of(&self.input)
             .with_checkpoints(&self.checkpoint)?
             .with_systems(self.system.dump_system.as_deref())?;
-        let (input, unit, mut warnings) = net_files::read(&self.input, &self.part)?;
+        let (input, unit, mut warnings) = net_files::read(context, &self.input, &self.part)?;
         let net = match input {
             NetInput::Net(surface) => surface.net().clone(),
             NetInput::Mesh(mesh) => QuadNet::new(&mesh).map_err(refused)?,
         };
         let reference = match &self.reference {
             None => None,
-            Some(path) => {
-                Some(TriMesh::from_poly_mesh(&net_files::read_mesh(path, &PartArgs::default())?.0))
-            }
+            Some(path) => Some(TriMesh::from_poly_mesh(
+                &net_files::read_mesh(None, path, &PartArgs::default())?.0,
+            )),
         };
         let input = match &reference {
             None => Input::new(&net),

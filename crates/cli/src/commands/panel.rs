@@ -27,8 +27,9 @@ pub(crate) struct Panel {
     input: PathBuf,
     #[command(flatten)]
     surface: SurfaceArgs,
-    /// Where to write (repeatable): panels as glb or obj, their table as csv or ron, molds as step,
-    /// flat outlines of panels on planar and cylindrical molds as svg or dxf
+    /// Where to write (repeatable): panels as glb or obj, molds as step, both as 3dm with a layer
+    /// per mold, a table of the panels as csv or ron, flat outlines of panels on planar and
+    /// cylindrical molds as svg or dxf
     #[arg(short, long = "output", value_name = "FILE", required = true)]
     output: Vec<PathBuf>,
     #[command(flatten)]
@@ -81,7 +82,7 @@ impl Panel {
         let options = self.options.options(&self.config)?;
         let mut watch =
             Watch::new(context, "panelling").of(&self.input).with_checkpoints(&self.checkpoint)?;
-        let (model, named) = read_surface(&self.input, &self.surface)?;
+        let (model, named) = read_surface(context, &self.input, &self.surface)?;
         let unit = model.unit;
         let layout = layout(self.options.file("layout"), &options, &named.surface)?;
         let prices = match &self.prices {
@@ -141,7 +142,7 @@ impl Panel {
             if !PANEL_OUTPUTS.contains(&extension.as_str()) {
                 return Err(Failure::input(
                     path,
-                    "panels are written as glb or obj, their table as csv or ron, molds as step, flat outlines as svg or dxf",
+                    "panels are written as glb or obj, their table as csv or ron, molds as step, both as 3dm, flat outlines as svg or dxf",
                 ));
             }
             check_output_path(path)?;

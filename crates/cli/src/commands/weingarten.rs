@@ -4,7 +4,7 @@ use crate::args::{ConfigArgs, EndingArgs, OutputArgs, ReportArgs, SystemArgs};
 use crate::checkpoints::CheckpointArgs;
 use crate::context::Context;
 use crate::failure::Failure;
-use crate::input_file::{SurfaceArgs, read_surface};
+use crate::input_file::{SurfaceArgs, read_other_surface, read_surface};
 use crate::option_flags::{OptionFlags, refused};
 use crate::outcome::{Outcome, Status};
 use crate::report_support;
@@ -26,7 +26,7 @@ Examples:
       --levels 10x8,14x10,18x14,25x18 --metrics roof.json
 A relation `curve` takes its control points from a file too: --relation curve=FILE.ron.")]
 pub(crate) struct Weingarten {
-    /// File with a B-spline surface (RON, STEP)
+    /// File with a B-spline surface (RON, STEP, 3DM)
     input: PathBuf,
     #[command(flatten)]
     surface: SurfaceArgs,
@@ -58,13 +58,8 @@ impl Weingarten {
             .of(&self.input)
             .with_checkpoints(&self.checkpoint)?
             .with_systems(self.system.dump_system.as_deref())?;
-        let (model, named) = read_surface(&self.input, &self.surface)?;
-        let start = self
-            .start
-            .as_deref()
-            .map(|path| read_surface(path, &SurfaceArgs::default()))
-            .transpose()?
-            .map(|(_, start)| start.surface);
+        let (model, named) = read_surface(context, &self.input, &self.surface)?;
+        let start = self.start.as_deref().map(read_other_surface).transpose()?;
         let mut input = Input::within(&named.surface, named.trim.as_ref());
         if let Some(start) = &start {
             input = input.starting_from(start);

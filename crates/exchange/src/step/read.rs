@@ -319,7 +319,7 @@ impl<'a> Reader<'_, 'a> {
             }
         }
         let name = if name.is_empty() { part.to_owned() } else { name.clone() };
-        out.push(NamedSurface { name, surface, trim, color: owned.color });
+        out.push(NamedSurface { trim, color: owned.color, ..NamedSurface::new(name, surface) });
         Ok(())
     }
 

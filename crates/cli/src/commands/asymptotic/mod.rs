@@ -61,7 +61,7 @@ impl Asymptotic {
         options.check().map_err(|e| Failure::usage(said(&e)))?;
         let mut watch =
             Watch::new(context, "solving").of(&self.data).with_checkpoints(&self.checkpoint)?;
-        let (input, unit) = read_input(&self.data, &self.part, &options)?;
+        let (input, unit) = read_input(context, &self.data, &self.part, &options)?;
         let result = match solve(&input, &options, &mut watch) {
             Ok(result) => result,
             Err(Error::Interrupted { .. }) => {
@@ -97,6 +97,7 @@ impl Asymptotic {
 }
 
 fn read_input(
+    context: &Context,
     path: &Path,
     part: &PartArgs,
     options: &Options,
@@ -112,13 +113,14 @@ fn read_input(
             let net = exchange::read_net(&text).map_err(|e| refused(&e))?;
             (net.to_poly_mesh().map_err(|e| refused(&e))?, LengthUnit::default())
         } else {
-            let (mesh, unit, _) = crate::net_files::read_mesh(path, part)?;
+            let (mesh, unit, _) = crate::net_files::read_mesh(Some(context), path, part)?;
             (mesh, unit)
         };
         return Ok((mesh.into(), unit));
     }
-    if exchange::extension_of(path) == "obj" {
-        let model = exchange::read_model(path).map_err(|e| refused(&e))?;
+    if has_polylines(path) {
+        let format = context.input_format.as_deref();
+        let model = exchange::read_model_as(path, format).map_err(|e| refused(&e))?;
         let lines = model.meshes.iter().flat_map(|m| (0..m.lines.len()).map(|k| m.polyline(k)));
         let polylines: Vec<Vec<geom_core::DVec3>> = lines.map(Iterator::collect).collect();
         if polylines.is_empty() {
@@ -133,6 +135,11 @@ fn read_input(
             .ok_or_else(|| refused(&format!("unknown unit `{symbol}`; use mm, cm, m or in")))?,
     };
     Ok((file.input().map_err(|e| refused(&e))?, unit))
+}
+
+/// Whether the format of a file has polylines.
+fn has_polylines(path: &Path) -> bool {
+    matches!(exchange::extension_of(path).as_str(), "obj" | "3dm")
 }
 
 /// The patches as clamped B-splines of one span.
@@ -153,7 +160,7 @@ fn surfaces(result: &Solution) -> Result<Vec<NamedSurface>, Failure> {
 /// Surfaces for every format, and the curves as polylines where the format has them.
 fn model_for(path: &Path, result: &Solution, unit: &LengthUnit) -> Result<Model, Failure> {
     let mut model = Model { unit: unit.clone(), surfaces: surfaces(result)?, ..Model::default() };
-    if exchange::extension_of(path) == "obj" {
+    if has_polylines(path) {
         model.meshes.push(curves_mesh(result));
     }
     Ok(model)
