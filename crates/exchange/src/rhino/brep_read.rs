@@ -162,7 +162,7 @@ fn face_text(data: &mut Cursor<'_>) -> Result<FaceText, ReadError> {
 }
 
 /// An item by its number, or why it is not there.
-fn named<'t, T>(list: &'t [Result<T, Lost>], index: Option<usize>) -> Result<&'t T, Lost> {
+fn named<T>(list: &[Result<T, Lost>], index: Option<usize>) -> Result<&T, Lost> {
     match index.and_then(|k| list.get(k)) {
         Some(Ok(item)) => Ok(item),
         Some(Err(Lost::Kind(kind))) => Err(Lost::Kind(kind)),

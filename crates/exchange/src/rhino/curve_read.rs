@@ -75,7 +75,6 @@ pub(super) fn dimension(found: i32) -> Result<usize, Lost> {
 }
 
 /// Points of `dimension` numbers; rational ones are given times their weights.
-#[expect(clippy::type_complexity, reason = "points and their weights")]
 pub(super) fn control_points(
     data: &mut Cursor<'_>,
     count: usize,

@@ -317,7 +317,7 @@ fn attributes_of(mut data: Cursor<'_>) -> Result<Attributes, ReadError> {
             2 => drop(data.text()?),
             // Linetype, material, density of wires.
             3 | 4 | 10 => drop(data.i32()?),
-            5 => drop(data.chunk()?),
+            5 => _ = data.chunk()?,
             6 => {
                 let rgb = data.take(4)?;
                 color = Some([rgb[0], rgb[1], rgb[2]]);
