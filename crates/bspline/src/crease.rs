@@ -1,7 +1,9 @@
 //! Kinks inside a surface, along knots of full multiplicity.
 
 use crate::knots::KnotVector;
+use crate::region::Region;
 use crate::surface::BsplineSurface;
+use crate::trim::Trim;
 use glam::DVec3;
 use std::fmt;
 
@@ -41,7 +43,8 @@ impl fmt::Display for Crease {
 }
 
 impl BsplineSurface {
-    /// All knot lines inside the surface whose two sides meet at more than [`CREASE_ANGLE`].
+    /// All knot lines inside the surface, or the part that `trim` bounds, whose two sides meet at
+    /// more than [`CREASE_ANGLE`].
     ///
     /// # Example
     /// ```
@@ -52,20 +55,30 @@ impl BsplineSurface {
     /// let points = [(0.0, 0.0), (1.0, 1.0), (2.0, 0.0)];
     /// let net = points.iter().flat_map(|&(x, z)| [DVec3::new(x, 0.0, z), DVec3::new(x, 1.0, z)]);
     /// let roof = BsplineSurface::new(knots(1, 3)?, knots(1, 2)?, net.collect(), None)?;
-    /// let [ridge] = roof.creases()[..] else { panic!("one ridge") };
+    /// let [ridge] = roof.creases(None)[..] else { panic!("one ridge") };
     /// assert!(ridge.constant_u && ridge.parameter == 0.5);
     /// assert!((ridge.angle.to_degrees() - 90.0).abs() < 1e-12);
     /// # Ok::<(), Box<dyn std::error::Error>>(())
     /// ```
     #[must_use]
-    pub fn creases(&self) -> Vec<Crease> {
+    pub fn creases(&self, trim: Option<&Trim>) -> Vec<Crease> {
+        let region = trim.map(|trim| Region::new(trim, self));
+        let counts = |[u, v]: [f64; 2]| region.as_ref().is_none_or(|region| region.contains(u, v));
         let turn = |c: Crease| Crease { constant_u: false, at: [c.at[1], c.at[0]], ..c };
-        let across_v = creases_across_u(&self.swapped()).into_iter().map(turn);
-        creases_across_u(self).into_iter().chain(across_v).collect()
+        let across_v = creases_across_u(&self.swapped(), |[v, u]| counts([u, v]));
+        let across_v = across_v.into_iter().map(turn);
+        creases_across_u(self, counts).into_iter().chain(across_v).collect()
+    }
+
+    /// The sharpest of the [creases](Self::creases).
+    #[must_use]
+    pub fn sharpest_crease(&self, trim: Option<&Trim>) -> Option<Crease> {
+        self.creases(trim).into_iter().max_by(|a, b| a.angle.total_cmp(&b.angle))
     }
 }
 
-fn creases_across_u(surface: &BsplineSurface) -> Vec<Crease> {
+/// The creases of constant u, at the places that count.
+fn creases_across_u(surface: &BsplineSurface, counts: impl Fn([f64; 2]) -> bool) -> Vec<Crease> {
     let knots = surface.knots_u();
     let breaks = knots.breaks();
     let places = places(surface.knots_v());
@@ -73,7 +86,10 @@ fn creases_across_u(surface: &BsplineSurface) -> Vec<Crease> {
     breaks
         .windows(3)
         .filter(|w| full(w[1]))
-        .filter_map(|w| sharpest(surface, [w[0], w[1], w[2]], &places))
+        .filter_map(|w| {
+            let places = places.iter().copied().filter(|&v| counts([w[1], v]));
+            sharpest(surface, [w[0], w[1], w[2]], places)
+        })
         .collect()
 }
 
@@ -81,13 +97,13 @@ fn creases_across_u(surface: &BsplineSurface) -> Vec<Crease> {
 fn sharpest(
     surface: &BsplineSurface,
     [before, line, after]: [f64; 3],
-    places: &[f64],
+    places: impl Iterator<Item = f64>,
 ) -> Option<Crease> {
     let (start, end) = surface.knots_v().domain();
     let part = |a: f64, b: f64| surface.subdomain([a, b], [start, end]).ok();
     let (left, right) = (part(before, line)?, part(line, after)?);
     let mut found: Option<Crease> = None;
-    for &v in places {
+    for v in places {
         let [a, b] = [&left, &right].map(|side| side.jet(line, v, 1));
         let (Ok(n), Ok(m)) = (a.normal(), b.normal()) else { continue };
         let angle = n.cross(m).length().atan2(n.dot(m));
@@ -121,7 +137,7 @@ mod tests {
         let axis = Axis { origin: DVec3::ZERO, direction: DVec3::Z };
         let torus = BsplineSurface::revolution(&ring, axis, spans).unwrap();
         assert!(torus.knots_u().multiplicities().len() > 2);
-        assert_eq!(torus.creases(), []);
+        assert_eq!(torus.creases(None), []);
     }
 
     #[test]
@@ -139,7 +155,8 @@ mod tests {
         let net = (0..14).map(point).collect();
         let surface = BsplineSurface::new(knots.unwrap(), across, net, None).unwrap();
         for (surface, constant_u) in [(surface.clone(), true), (surface.swapped(), false)] {
-            let [crease] = surface.creases()[..] else { panic!("{:?}", surface.creases()) };
+            let creases = surface.creases(None);
+            let [crease] = creases[..] else { panic!("{creases:?}") };
             assert_eq!((crease.constant_u, crease.parameter), (constant_u, 0.5));
             assert!((crease.angle.to_degrees() - 45.0).abs() < 1e-9, "{crease}");
             assert_eq!(crease.point, DVec3::new(0.0, 1.0, 0.0));

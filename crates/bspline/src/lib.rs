@@ -5,6 +5,7 @@
 //! are clamped to it, or wrapped where the direction is periodic.
 
 mod basis;
+mod check_grid;
 mod closest;
 mod conic;
 mod crease;
@@ -18,6 +19,7 @@ mod knots;
 mod lift;
 mod offset;
 mod pole;
+mod quadrature;
 mod rational;
 mod refine;
 mod region;
@@ -27,8 +29,10 @@ mod surface;
 mod sweep;
 mod table;
 mod trim;
+mod trim_mesh;
 
 pub use basis::{BasisValues, MAX_DERIVATIVE};
+pub use check_grid::{Flaw, FlawKind, LEAST_AREA_RATIO};
 pub use closest::SurfaceLocator;
 pub use conic::ArcSpans;
 pub use crease::{CREASE_ANGLE, Crease};
@@ -48,3 +52,4 @@ pub use surface::BsplineSurface;
 pub use sweep::Axis;
 pub use table::{BasisTable, SampleGrid, SpanSamples};
 pub use trim::{Trim, TrimCurve, TrimError, TrimLoop};
+pub use trim_mesh::TrimMesh;

@@ -4,6 +4,7 @@ use crate::error::SplineError;
 use crate::knots::{Degree, KnotVector};
 use crate::rational;
 use crate::surface::BsplineSurface;
+use crate::trim::{Trim, TrimLoop};
 use geom_core::{BoundingBox, CurvatureError, SurfaceJet};
 use glam::{DVec3, DVec4};
 
@@ -45,7 +46,8 @@ impl Side {
 }
 
 impl BsplineSurface {
-    /// The sides whose control points coincide, to 1e-10 of the surface's size: poles.
+    /// The sides whose control points coincide, to 1e-10 of the surface's size: poles. Of a trimmed
+    /// face those that it reaches.
     ///
     /// # Example
     /// ```
@@ -54,11 +56,11 @@ impl BsplineSurface {
     /// let line = || KnotVector::clamped_uniform(Degree::new(1)?, 2);
     /// let corners = vec![DVec3::ZERO, 1e-15 * DVec3::Y, DVec3::X, DVec3::ONE];
     /// let triangle = BsplineSurface::new(line()?, line()?, corners, None)?;
-    /// assert_eq!(triangle.pole_sides(), [Side::StartU]);
+    /// assert_eq!(triangle.pole_sides(None), [Side::StartU]);
     /// # Ok::<(), Box<dyn std::error::Error>>(())
     /// ```
     #[must_use]
-    pub fn pole_sides(&self) -> Vec<Side> {
+    pub fn pole_sides(&self, trim: Option<&Trim>) -> Vec<Side> {
         let size = BoundingBox::of(self.control_points().iter().copied())
             .map_or(0.0, BoundingBox::diagonal);
         let collapsed = |side: &Side| {
@@ -68,7 +70,11 @@ impl BsplineSurface {
             is_clamped_at(knots, side.is_end())
                 && points.all(|p| p.distance(first) <= COLLAPSED * size)
         };
-        Side::ALL.into_iter().filter(collapsed).collect()
+        let reached = |side: &Side| {
+            let mut border = trim.into_iter().flat_map(Trim::loops).flat_map(TrimLoop::polygon);
+            trim.is_none() || border.any(|p| self.is_on_pole(&[*side], [p.x, p.y]))
+        };
+        Side::ALL.into_iter().filter(|side| collapsed(side) && reached(side)).collect()
     }
 
     /// Whether a parameter pair lies on a pole.
@@ -123,7 +129,7 @@ impl<'s> SurfaceCurvature<'s> {
     /// [`SplineError`] if a number leaves the range of `f64`.
     pub fn new(surface: &'s BsplineSurface) -> Result<Self, SplineError> {
         let strip = |side| PoleStrip::new(surface, side);
-        let poles = surface.pole_sides().into_iter().map(strip).collect::<Result<_, _>>()?;
+        let poles = surface.pole_sides(None).into_iter().map(strip).collect::<Result<_, _>>()?;
         Ok(Self { surface, poles })
     }
 
@@ -315,8 +321,8 @@ mod tests {
             (sphere.reversed_u(), -1.0),
             (sphere.swapped().reversed_u(), 1.0),
         ] {
-            assert_eq!(surface.pole_sides().len(), 2);
-            assert_eq!(rounded(&surface).pole_sides(), surface.pole_sides());
+            assert_eq!(surface.pole_sides(None).len(), 2);
+            assert_eq!(rounded(&surface).pole_sides(None), surface.pole_sides(None));
             check_sphere(&surface, outward * sign);
             check_sphere(&rounded(&surface), outward * sign);
         }
@@ -338,7 +344,7 @@ mod tests {
         let points: Vec<DVec3> = (0..16).map(|k| point(at(k / 4), at(k % 4))).collect();
         let patch = crate::fit_surface(&knots(3), &knots(3), &parameters, &parameters, &points);
         let patch = patch.unwrap();
-        assert_eq!(patch.pole_sides(), [Side::StartV]);
+        assert_eq!(patch.pole_sides(None), [Side::StartV]);
         let curvature = SurfaceCurvature::new(&patch).unwrap();
         // H and K of the graph at the origin, whose normal is S_u × S_v = −z here or z.
         let (h, k) = (0.5 * (2.0 + 4.0), 2.0 * 4.0 - 9.0);
@@ -363,7 +369,7 @@ mod tests {
         let axis = Axis { origin: DVec3::ZERO, direction: DVec3::Z };
         let cone = BsplineSurface::revolution(&line, axis, ArcSpans::new(0.0, TAU)).unwrap();
         let curvature = SurfaceCurvature::new(&cone).unwrap();
-        let pole = cone.pole_sides()[0];
+        let pole = cone.pole_sides(None)[0];
         let at = |u: f64, t: f64| if pole.is_u() { (t, u) } else { (u, t) };
         let (u, v) = at(0.3 * PI, 0.0);
         assert!(curvature.at(u, v).is_err());

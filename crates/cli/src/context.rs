@@ -1,29 +1,25 @@
-//! What every command is given: verbosity, threads, the interrupt flag, a progress bar.
+//! What every command is given: verbosity, threads, Ctrl-C, a progress bar.
 
 use crate::args::GlobalArgs;
-use crate::failure::{Failure, INTERRUPTED};
-use exchange::Model;
+use crate::failure::Failure;
+use crate::interrupt::Interrupt;
 use geom_core::{Budget, Cost};
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use std::io::IsTerminal;
-use std::path::Path;
 use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
 
 /// Set up once, before the command runs.
 #[derive(Debug)]
 pub(crate) struct Context {
     /// Threads of the global rayon pool.
     pub(crate) threads: usize,
+    /// Ctrl-C.
+    pub(crate) interrupt: Arc<Interrupt>,
+    /// The format of the input, if it is said.
+    pub(crate) input_format: Option<String>,
     quiet: bool,
-    /// Whether corners of meshes that coincide are welded.
-    weld: bool,
     /// What a run may take; nothing is checked with `--force`.
     budget: Option<Budget>,
-    interrupt: Arc<AtomicBool>,
-    /// Whether somebody will act on the interrupt flag: a solver that asks for it between steps,
-    /// or `main` while it writes.
-    heeded: Arc<AtomicBool>,
 }
 
 impl Context {
@@ -35,33 +31,13 @@ impl Context {
             pool = pool.num_threads(threads.get());
         }
         pool.build_global().map_err(|e| Failure::other(format!("cannot start threads: {e}")))?;
-        let interrupt = Arc::new(AtomicBool::new(false));
-        let heeded = Arc::new(AtomicBool::new(false));
-        let (flag, listener) = (Arc::clone(&interrupt), Arc::clone(&heeded));
-        // The first Ctrl-C asks the solver to stop and write its checkpoint, the second one ends;
-        // so does the first one where no solver has begun to ask, for nothing is written yet.
-        let handler = move || {
-            if flag.swap(true, Ordering::SeqCst) || !listener.load(Ordering::SeqCst) {
-                std::process::exit(i32::from(INTERRUPTED));
-            }
-        };
-        ctrlc::set_handler(handler)
-            .map_err(|e| Failure::other(format!("cannot listen for Ctrl-C: {e}")))?;
-        let threads = rayon::current_num_threads();
+        let interrupt = Interrupt::listen()?;
+        let (threads, input_format) = (rayon::current_num_threads(), global.input_format.clone());
         let budget = match total_memory() {
             Some(memory) if !global.force => Some(Budget::of_machine(memory, threads)),
             _ => None,
         };
-        let (quiet, weld) = (global.quiet, !global.no_weld);
-        Ok(Self { threads, quiet, weld, budget, interrupt, heeded })
-    }
-
-    /// The content of a file, with its meshes welded and oriented; what was done is among the
-    /// warnings.
-    pub(crate) fn read_model(&self, path: &Path) -> Result<Model, Failure> {
-        let mut model = exchange::read_model(path).map_err(|e| Failure::input(path, e))?;
-        model.mend(self.weld);
-        Ok(model)
+        Ok(Self { threads, interrupt, input_format, quiet: global.quiet, budget })
     }
 
     /// Refuses a run that would exceed the machine, in the name of the option that asks for it.
@@ -71,18 +47,6 @@ impl Context {
             let message = e.to_string().replace(&format!("`{option}`"), &flag_name(option));
             Failure::usage(format!("{message}, or go on with --force"))
         })
-    }
-
-    /// Whether the user pressed Ctrl-C: the callback of every solver asks.
-    pub(crate) fn interrupted(&self) -> bool {
-        self.heeded.store(true, Ordering::SeqCst);
-        self.interrupt.load(Ordering::SeqCst)
-    }
-
-    /// From here on Ctrl-C waits until the files are written, which takes a moment only; then no
-    /// temporary file is left behind.
-    pub(crate) fn begin_writing(&self) {
-        self.heeded.store(true, Ordering::SeqCst);
     }
 
     /// A progress bar of `steps` steps on stderr; invisible unless stderr is a terminal.

@@ -5,22 +5,24 @@
 #![allow(clippy::print_stdout, reason = "a command line tool prints")]
 
 mod args;
+mod checkpoints;
 mod commands;
 mod config;
 mod context;
 mod failure;
+mod input_file;
+mod interrupt;
 mod net_files;
 mod net_report;
 mod option_flags;
 mod outcome;
 mod panel_files;
 mod report_support;
-mod surface_file;
 mod watch;
 
 use clap::{CommandFactory, Parser};
 use context::Context;
-use failure::{DEFECT, Failure, INTERRUPTED, NOT_CONVERGED, OK, USAGE};
+use failure::{DEFECT, FAILED, Failure, INTERRUPTED, NOT_CONVERGED, OK, USAGE, say};
 use outcome::{Outcome, Status};
 use std::io::Write;
 use std::process::ExitCode;
@@ -81,23 +83,51 @@ fn run(
     if let Some(path) = &global.metrics {
         args::check_output_path(path)?;
     }
-    let name = command.name();
+    context.interrupt.begin(interrupt::Run {
+        command: command.name(),
+        begin,
+        threads: context.threads,
+        metrics: global.metrics.clone(),
+        quiet: global.quiet,
+    });
     let outcome = command.run(context)?;
+    write(outcome, &context.interrupt, global.quiet)
+}
+
+/// Writes and prints what a command has found, or what there is of it after Ctrl-C.
+fn write(
+    mut outcome: Outcome,
+    interrupt: &interrupt::Interrupt,
+    quiet: bool,
+) -> Result<u8, Failure> {
+    // From here on this thread ends the program.
+    let desk = interrupt.desk();
+    outcome.checkpoint = desk.checkpoint();
+    outcome.warnings.extend(desk.trouble().map(|t| format!("no checkpoint on the way: {t}")));
     for warning in &outcome.warnings {
         say(&format!("warning: {warning}"));
     }
-    let metrics = global.metrics.as_ref().map(|path| {
-        (path.clone(), outcome.metrics_file(name, begin.elapsed().as_secs_f64(), context.threads))
-    });
-    context.begin_writing();
-    outcome.write_files(metrics)?;
-    if !global.quiet {
+    if interrupt.is_wanted() {
+        outcome.status = Status::Interrupted;
+    }
+    let is_over = outcome.status == Status::Interrupted;
+    let is_stopped = || !is_over && interrupt.is_wanted();
+    if !outcome.write_files(desk.metrics_of(&outcome), &is_stopped)? {
+        outcome.status = Status::Interrupted;
+        outcome.write_files(desk.metrics_of(&outcome), &|| false)?;
+    }
+    if !quiet {
         let mut out = std::io::stdout().lock();
         for line in &outcome.summary {
             // A closed pipe (`umbilic … | head`) is the reader's choice, not an error.
             let _ = writeln!(out, "{line}");
         }
     }
+    if outcome.status == Status::Interrupted {
+        desk.part(&outcome);
+    }
+    // Never given back: nobody is to end the program after this.
+    std::mem::forget(desk);
     Ok(exit_code(&outcome))
 }
 
@@ -105,12 +135,8 @@ fn exit_code(outcome: &Outcome) -> u8 {
     match outcome.status {
         Status::Interrupted => INTERRUPTED,
         Status::Converged => OK,
+        Status::Failed => FAILED,
         _ if outcome.require_converged => NOT_CONVERGED,
         _ => OK,
     }
-}
-
-/// One line on stderr, in the name of the program.
-fn say(message: &str) {
-    let _ = writeln!(std::io::stderr().lock(), "umbilic: {message}");
 }

@@ -1,6 +1,7 @@
 //! What a command hands back: files still in memory, numbers, and a summary.
 
 use crate::failure::Failure;
+use exchange::Model;
 use serde::Serialize;
 use std::path::{Path, PathBuf};
 
@@ -17,6 +18,8 @@ pub(crate) struct Outcome {
     pub(crate) input: Option<PathBuf>,
     /// Result files with their bytes, `-o` outputs first.
     pub(crate) files: Vec<(PathBuf, Vec<u8>)>,
+    /// Report, figures and systems, which are written of a failed result too.
+    pub(crate) pages: Vec<(PathBuf, Vec<u8>)>,
     /// The checkpoint, the only file besides the metrics that an interrupted run writes.
     pub(crate) checkpoint: Option<(PathBuf, Vec<u8>)>,
     /// The `metrics` object, keys as documented.
@@ -27,6 +30,8 @@ pub(crate) struct Outcome {
     pub(crate) warnings: Vec<String>,
     /// Whether another status than `converged` exits with code 3.
     pub(crate) require_converged: bool,
+    /// Whether the files of a failed result are written.
+    pub(crate) keep_failed: bool,
 }
 
 impl Outcome {
@@ -37,11 +42,13 @@ impl Outcome {
             iterations,
             input: None,
             files: Vec::new(),
+            pages: Vec::new(),
             checkpoint: None,
             metrics: serde_json::json!({}),
             summary: Vec::new(),
             warnings: Vec::new(),
             require_converged: false,
+            keep_failed: false,
         }
     }
 
@@ -55,6 +62,18 @@ impl Outcome {
     pub(crate) fn with_metrics<T: Serialize>(mut self, metrics: &T) -> Result<Self, Failure> {
         self.metrics = serde_json::to_value(metrics).map_err(Failure::other)?;
         Ok(self)
+    }
+
+    /// Adds a file with this content; the extension chooses the format.
+    pub(crate) fn add_model(&mut self, path: PathBuf, model: &Model) -> Result<(), Failure> {
+        let bytes = exchange::encode_model(&path, model).map_err(|e| Failure::input(&path, e))?;
+        if let Some(lost) = model.unit.lost_in(&exchange::extension_of(&path))
+            && !self.warnings.contains(&lost)
+        {
+            self.warnings.push(lost);
+        }
+        self.files.push((path, bytes));
+        Ok(())
     }
 
     /// The bytes of the metrics file.
@@ -76,8 +95,13 @@ impl Outcome {
         bytes
     }
 
-    /// Writes all files, or none of them.
-    pub(crate) fn write_files(&self, metrics: Option<(PathBuf, Vec<u8>)>) -> Result<(), Failure> {
+    /// Writes all files, or none of them if `is_stopped` says so meanwhile; returns whether they
+    /// were written.
+    pub(crate) fn write_files(
+        &self,
+        metrics: Option<(PathBuf, Vec<u8>)>,
+        is_stopped: &dyn Fn() -> bool,
+    ) -> Result<bool, Failure> {
         let files: Vec<(&Path, &[u8])> = self
             .written()
             .chain(metrics.as_ref())
@@ -89,12 +113,17 @@ impl Outcome {
                 return Err(Failure::usage(format!("{}: {message}", path.display())));
             }
         }
-        exchange::write_files(&files).map_err(Failure::usage)
+        exchange::write_files_unless(&files, is_stopped).map_err(Failure::usage)
     }
 
     fn written(&self) -> impl Iterator<Item = &(PathBuf, Vec<u8>)> {
-        let results = if self.status == Status::Interrupted { &[][..] } else { &self.files };
-        results.iter().chain(&self.checkpoint)
+        let nothing: &[(PathBuf, Vec<u8>)] = &[];
+        let (files, pages) = match self.status {
+            Status::Interrupted => (nothing, nothing),
+            Status::Failed if !self.keep_failed => (nothing, &self.pages[..]),
+            _ => (&self.files[..], &self.pages[..]),
+        };
+        files.iter().chain(pages).chain(&self.checkpoint)
     }
 }
 

@@ -65,6 +65,20 @@ impl CurvatureStatistics {
         };
     }
 
+    /// The same statistics of a model that stands elsewhere.
+    #[must_use]
+    pub fn moved(self, by: DVec3) -> Self {
+        let moved = |b: BoundingBox| BoundingBox { min: b.min + by, max: b.max + by };
+        let gathered = |g: Option<Gathered>| g.map(|g| g.moved(by));
+        Self {
+            bounding_box: self.bounding_box.map(moved),
+            mean: gathered(self.mean),
+            gaussian: gathered(self.gaussian),
+            principal: gathered(self.principal),
+            ..self
+        }
+    }
+
     /// Adds area that may or may not have curvatures.
     pub fn add_area(&mut self, area: f64) {
         self.area += area;
@@ -97,6 +111,21 @@ impl CurvatureStatistics {
     }
 
     /// Adds the samples of another surface.
+    ///
+    /// # Example
+    /// ```
+    /// use geom_core::{CurvatureStatistics, DVec3};
+    /// let patch = |area: f64, h: f64| {
+    ///     let mut patch = CurvatureStatistics::default();
+    ///     patch.add_area(area);
+    ///     patch.add(DVec3::ZERO, area, h, h * h);
+    ///     patch
+    /// };
+    /// let mut both = patch(1.0, -1.0); // of two spheres
+    /// both.merge(&patch(3.0, -0.5));
+    /// let h = both.mean_curvature().expect("samples");
+    /// assert_eq!((both.area, h.min, h.max, h.mean_abs), (4.0, -1.0, -0.5, 0.625));
+    /// ```
     pub fn merge(&mut self, other: &Self) {
         self.area += other.area;
         self.samples += other.samples;
@@ -168,6 +197,11 @@ fn gather(to: &mut Option<Gathered>, point: DVec3, weight: f64, values: &[f64], 
 }
 
 impl Gathered {
+    fn moved(self, by: DVec3) -> Self {
+        let moved = |(value, at): (f64, DVec3)| (value, at + by);
+        Self { min: moved(self.min), max: moved(self.max), ..self }
+    }
+
     fn merge(&mut self, other: &Self) {
         if other.min.0 < self.min.0 {
             self.min = other.min;

@@ -7,6 +7,7 @@ mod bounding_box;
 mod budget;
 mod curvature_derivatives;
 mod curvature_statistics;
+mod enclosing_ball;
 mod forms;
 mod isolines;
 mod jet;
@@ -14,6 +15,7 @@ mod jet_fit;
 mod mesh_curvature;
 mod mesh_repair;
 mod neighbours;
+mod normalization;
 mod poly_mesh;
 mod quad_grid;
 mod spread;
@@ -25,6 +27,7 @@ pub use bounding_box::BoundingBox;
 pub use budget::{Amount, Budget, BudgetError, Cost};
 pub use curvature_derivatives::CurvatureDerivatives;
 pub use curvature_statistics::{CurvatureStatistics, ValueRange};
+pub use enclosing_ball::Ball;
 pub use forms::{
     CurvatureError, FirstForm, PrincipalCurvatures, SINGULAR_RATIO, SecondForm,
     asymptotic_directions, gaussian_curvature, gradient_norm_squared, mean_curvature,
@@ -35,6 +38,7 @@ pub use isolines::{Isoline, isolines};
 pub use jet::SurfaceJet;
 pub use mesh_curvature::{VertexCurvature, mesh_curvature_statistics, vertex_curvatures};
 pub use mesh_repair::{coinciding_points, faces_to_turn};
+pub use normalization::{Normalization, NormalizationError};
 pub use numerics::assert_close;
 pub use poly_mesh::{FaceId, HalfEdgeId, MeshError, PolyMesh, VertexId};
 pub use quad_grid::{GridError, QuadGrid};

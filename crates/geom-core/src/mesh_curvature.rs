@@ -39,6 +39,22 @@ pub struct VertexCurvature {
 /// plane of the mean face normal (Cazals and Pouget 2005); where these cannot tell its terms apart,
 /// as along borders, a quartic of three or four rings, a cubic of three, or a quadratic. The error
 /// of the curvatures falls with the square of the edge length on a smooth surface.
+///
+/// # Example
+/// ```
+/// use geom_core::{DVec3, PolyMesh, vertex_curvatures};
+/// // The paraboloid z = (x² + y²) / 2 on a grid; its vertex, number 12, has H = 1 and K = 1.
+/// let xy = |k: u32| (0.1 * (f64::from(k / 5) - 2.0), 0.1 * (f64::from(k % 5) - 2.0));
+/// let points = (0..25).map(xy).map(|(x, y)| DVec3::new(x, y, 0.5 * (x * x + y * y))).collect();
+/// let quad = |k: u32| {
+///     let at = 5 * (k / 4) + k % 4;
+///     [at, at + 5, at + 6, at + 1]
+/// };
+/// let mesh = PolyMesh::new(points, &(0..16).map(quad).collect::<Vec<_>>())?;
+/// let vertex = vertex_curvatures(&mesh)[12].expect("it has neighbours");
+/// assert!((vertex.mean - 1.0).abs() < 1e-10 && (vertex.gaussian - 1.0).abs() < 1e-10);
+/// # Ok::<(), geom_core::MeshError>(())
+/// ```
 #[must_use]
 pub fn vertex_curvatures(mesh: &PolyMesh) -> Vec<Option<VertexCurvature>> {
     let surroundings = Surroundings::new(mesh);
@@ -50,6 +66,17 @@ pub fn vertex_curvatures(mesh: &PolyMesh) -> Vec<Option<VertexCurvature>> {
 }
 
 /// Curvatures of the whole mesh, each vertex standing for its share of the faces around it.
+///
+/// # Example
+/// ```
+/// use geom_core::{DVec3, PolyMesh, mesh_curvature_statistics};
+/// let points = (0..9).map(|k| DVec3::new(f64::from(k / 3), f64::from(k % 3), 0.0)).collect();
+/// let flat = PolyMesh::new(points, &[[0, 3, 4, 1], [1, 4, 5, 2], [3, 6, 7, 4], [4, 7, 8, 5]])?;
+/// let statistics = mesh_curvature_statistics(&flat);
+/// assert_eq!((statistics.area, statistics.samples), (4.0, 9));
+/// assert!(statistics.mean_curvature().expect("samples").mean_abs < 1e-12);
+/// # Ok::<(), geom_core::MeshError>(())
+/// ```
 #[must_use]
 pub fn mesh_curvature_statistics(mesh: &PolyMesh) -> CurvatureStatistics {
     let mut shares = vec![0.0; mesh.vertex_count()];

@@ -7,6 +7,19 @@ use geom_core::{MeshError, PolyMesh};
 pub const MAX_VALENCE: usize = 200;
 
 /// Why a control mesh cannot be evaluated.
+///
+/// # Example
+/// ```
+/// use geom_core::{DVec3, PolyMesh};
+/// use subdiv_catmull_clark::{Blend, Creases, SubdivisionSurface};
+/// let triangle = PolyMesh::new(vec![DVec3::ZERO, DVec3::X, DVec3::Y], &[[0, 1, 2]])?;
+/// let fault = SubdivisionSurface::new(&triangle, &Creases::none(), Blend::Smooth).unwrap_err();
+/// assert_eq!(
+///     fault.to_string(),
+///     "face 0 has 3 corners; refine the mesh once to turn all faces into quads"
+/// );
+/// # Ok::<(), geom_core::MeshError>(())
+/// ```
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 #[expect(missing_docs, reason = "the messages spell out every field")]

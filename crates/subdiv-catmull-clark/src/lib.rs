@@ -24,6 +24,7 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
+mod bezier;
 mod blend;
 mod characteristic;
 mod classes;

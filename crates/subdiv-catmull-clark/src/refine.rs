@@ -29,6 +29,19 @@ pub struct Refined {
 /// # Errors
 /// [`SubdivisionError::TooManyWeights`] if a face has thousands of corners, or
 /// [`SubdivisionError::Mesh`] if the result has more half-edges than ids.
+///
+/// # Example
+/// ```
+/// use geom_core::{DVec3, PolyMesh};
+/// use subdiv_catmull_clark::{Creases, refine};
+/// let corners = vec![DVec3::ZERO, DVec3::X, DVec3::Y, DVec3::Z];
+/// let tetrahedron = PolyMesh::new(corners, &[[0, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3]])?;
+/// let fine = refine(&tetrahedron, &Creases::none())?.mesh;
+/// // One vertex for each vertex, edge and face; one quad for each corner of a face.
+/// assert_eq!((fine.vertex_count(), fine.face_count()), (4 + 6 + 4, 12));
+/// assert_eq!(fine.euler_characteristic(), 2);
+/// # Ok::<(), subdiv_catmull_clark::SubdivisionError>(())
+/// ```
 pub fn refine(mesh: &PolyMesh, creases: &Creases) -> Result<Refined, SubdivisionError> {
     check_weights(mesh)?;
     let tags = Tags::new(mesh, creases);

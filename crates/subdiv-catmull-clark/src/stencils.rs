@@ -3,6 +3,21 @@
 use geom_core::DVec3;
 
 /// A sparse matrix that makes new points from old ones; every row sums to one.
+///
+/// # Example
+/// ```
+/// use geom_core::{DVec3, PolyMesh};
+/// use subdiv_catmull_clark::{Creases, refine};
+/// let corners = vec![DVec3::ZERO, DVec3::X, DVec3::X + DVec3::Y, DVec3::Y];
+/// let quad = PolyMesh::new(corners, &[[0, 1, 2, 3]])?;
+/// let stencils = refine(&quad, &Creases::none())?.stencils;
+/// // The last new point is the middle of the face.
+/// assert_eq!(stencils.row(8), (&[0, 1, 2, 3][..], &[0.25; 4][..]));
+/// // Refined again with other positions, at the cost of a product.
+/// let raised: Vec<DVec3> = quad.positions().iter().map(|p| *p + DVec3::Z).collect();
+/// assert_eq!(stencils.apply(&raised)[8], DVec3::new(0.5, 0.5, 1.0));
+/// # Ok::<(), subdiv_catmull_clark::SubdivisionError>(())
+/// ```
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Stencils {
     starts: Vec<usize>,

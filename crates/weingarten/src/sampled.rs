@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use bspline::{BsplineSurface, Side};
+use bspline::{BsplineSurface, Side, Trim};
 use geom_core::{BoundingBox, FirstForm};
 use gp_solver::Counts;
 
@@ -33,8 +33,8 @@ impl SampledSurface {
     /// the counts allow.
     ///
     /// # Errors
-    /// [`Error::Singular`] at a pole, a cusp or a collapsed edge, [`Error::Creased`],
-    /// [`Error::NoExtent`].
+    /// [`Error::Singular`] at a pole, a cusp or a collapsed edge, [`Error::Creased`] with a kink
+    /// inside.
     ///
     /// ```
     /// use gp_solver::{Counts, check_jacobian};
@@ -47,11 +47,11 @@ impl SampledSurface {
     /// # Ok::<(), Box<dyn std::error::Error>>(())
     /// ```
     pub fn new(surface: &BsplineSurface, samples: Counts) -> Result<Self, Error> {
-        check_smooth(surface)?;
+        check_smooth(surface, None)?;
         let grid = Arc::new(SampleGrid::uniform(surface, [samples.u, samples.v]));
         let x = coordinates(surface);
         let samples = regular_samples(&grid, &x)?;
-        let curvature = curvature_size(surface, &samples)?.unwrap_or(1.0);
+        let curvature = curvature_size(surface, &samples).unwrap_or(1.0);
         Ok(Self { grid, x, samples, curvature })
     }
 
@@ -63,8 +63,11 @@ impl SampledSurface {
     }
 }
 
-/// The samples of a surface, each checked to be regular.
+/// The samples of a surface that count, each checked to be regular.
 pub(crate) fn regular_samples(grid: &SampleGrid, x: &[f64]) -> Result<Vec<Sample>, Error> {
+    if grid.count() == 0 {
+        return Err(Error::NothingInside);
+    }
     let samples = samples(grid, x);
     let singular = |s: &Sample| {
         let first = FirstForm { e: s.e, f: s.f, g: s.g };
@@ -72,18 +75,18 @@ pub(crate) fn regular_samples(grid: &SampleGrid, x: &[f64]) -> Result<Vec<Sample
     };
     match samples.iter().position(singular) {
         Some(k) => {
-            let [u, v] = grid.parameters(k);
+            let [u, v] = grid.parameters(grid.place(k));
             Err(Error::Singular { u, v })
         }
         None => Ok(samples),
     }
 }
 
-/// Refuses poles, also those that collapse to rounding only, and creases: between the samples
-/// nobody would see them.
-pub(crate) fn check_smooth(surface: &BsplineSurface) -> Result<(), Error> {
+/// Refuses poles, also those that collapse to rounding only, and creases, as far as they belong to
+/// what is not trimmed away: between the samples nobody would see them.
+pub(crate) fn check_smooth(surface: &BsplineSurface, trim: Option<&Trim>) -> Result<(), Error> {
     let (u, v) = (surface.knots_u().domain(), surface.knots_v().domain());
-    if let Some(side) = surface.pole_sides().first() {
+    if let Some(side) = surface.pole_sides(trim).first() {
         let (u, v) = match side {
             Side::StartU | Side::StartV => (u.0, v.0),
             Side::EndU => (u.1, v.0),
@@ -91,8 +94,7 @@ pub(crate) fn check_smooth(surface: &BsplineSurface) -> Result<(), Error> {
         };
         return Err(Error::Singular { u, v });
     }
-    let sharpest = surface.creases().into_iter().max_by(|a, b| a.angle.total_cmp(&b.angle));
-    sharpest.map_or(Ok(()), |crease| Err(Error::Creased { crease }))
+    surface.sharpest_crease(trim).map_or(Ok(()), |crease| Err(Error::Creased { crease }))
 }
 
 /// Samples in u and v: as asked for, or twice the control points.
@@ -101,21 +103,17 @@ pub(crate) fn sample_counts(surface: &BsplineSurface, samples: Option<Counts>) -
 }
 
 /// Mean absolute principal curvature of samples of a surface, `None` where nothing is curved.
-pub(crate) fn curvature_size(
-    surface: &BsplineSurface,
-    samples: &[Sample],
-) -> Result<Option<f64>, Error> {
+pub(crate) fn curvature_size(surface: &BsplineSurface, samples: &[Sample]) -> Option<f64> {
     let mean = |s: &Sample| {
         let (k1, k2) = s.principal();
         0.5 * (k1.abs() + k2.abs())
     };
     let curvature = samples.iter().map(mean).sum::<f64>() / samples.len() as f64;
-    Ok((curvature * extent(surface)? > FLAT_RATIO).then_some(curvature))
+    (curvature * extent(surface) > FLAT_RATIO).then_some(curvature)
 }
 
-/// Diagonal of the bounding box of the control points.
-pub(crate) fn extent(surface: &BsplineSurface) -> Result<f64, Error> {
-    let diagonal = BoundingBox::of(surface.control_points().iter().copied())
-        .map_or(0.0, BoundingBox::diagonal);
-    if diagonal > 0.0 { Ok(diagonal) } else { Err(Error::NoExtent) }
+/// Diagonal of the bounding box of the control points: a size that costs nothing, for what does not
+/// depend on a factor of two.
+fn extent(surface: &BsplineSurface) -> f64 {
+    BoundingBox::of(surface.control_points().iter().copied()).map_or(0.0, BoundingBox::diagonal)
 }

@@ -1,30 +1,46 @@
 //! `umbilic analyze INPUT`.
 
 use crate::args::ReportArgs;
+use crate::commands::analyze_list::Listing;
 use crate::commands::fair::{samples_of, view};
 use crate::context::Context;
 use crate::failure::Failure;
+use crate::input_file::{self, PartArgs, SurfaceArgs};
 use crate::outcome::{Outcome, Status};
 use crate::report_support;
 use curvature_variation::{Rings, SurfaceAnalysis, fitted_torus};
-use exchange::{Mesh, Model};
-use geom_core::{CurvatureStatistics, DVec3, PolyMesh, ValueRange, mesh_curvature_statistics};
+use exchange::{Mesh, Model, NamedSurface};
+use geom_core::{
+    CurvatureStatistics, DVec3, Normalization, PolyMesh, ValueRange, mesh_curvature_statistics,
+};
 use gp_solver::OptionValue;
 use serde::Serialize;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use subdiv_catmull_clark::{Blend, SubdivisionSurface};
 
+/// Surfaces, and meshes, that the summary names one by one.
+const MOST_LINES: usize = 12;
+
 /// Arguments of `analyze`.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "\
 Examples:
   umbilic analyze fixtures/roof.ron --metrics roof.json
+  umbilic analyze fixtures/step/bracket.step --list
+  umbilic analyze fixtures/step/bracket.step --surface 1 --surface 2
   umbilic analyze fixtures/quads/clifford.obj --discrete-bending
 A mesh of quads is read as the control mesh of its Catmull-Clark surface.")]
 pub(crate) struct Analyze {
     /// File with surfaces or meshes; surfaces are preferred if it has both
     input: PathBuf,
+    #[command(flatten)]
+    surface: SurfaceArgs,
+    #[command(flatten)]
+    part: PartArgs,
+    /// Show a table of the surfaces and meshes in the file and measure no more
+    #[arg(long, conflicts_with_all = ["discrete_bending", "report", "figures"])]
+    list: bool,
     /// Also the edge-based bending energy of the faces themselves, to compare with the surface's
     #[arg(long)]
     discrete_bending: bool,
@@ -40,10 +56,21 @@ pub(crate) struct Analyze {
 impl Analyze {
     pub(crate) fn run(self, context: &Context) -> Result<Outcome, Failure> {
         self.report.check()?;
-        let model = context.read_model(&self.input)?;
+        let model = input_file::read(context, &self.input, &self.surface, &self.part)?;
+        if self.list {
+            let listing = Listing::new(&model);
+            let outcome = Outcome::new(Status::Converged, 0).with_input(&self.input);
+            let mut outcome = outcome.with_metrics(&listing)?;
+            outcome.summary = listing.lines(&model.unit.to_string());
+            outcome.warnings.clone_from(&model.warnings);
+            return Ok(outcome);
+        }
         let rings = self.blend_rings.and_then(Rings::count);
+        // Near the origin nothing is lost to rounding.
+        let (centred, center) = centred(&model);
         let Measured { kind, statistics, subdivision, limit, warnings } =
-            measure(&self.input, &model, rings)?;
+            measure(&self.input, &centred, rings)?;
+        let statistics = statistics.moved(center);
         let mut metrics = AnalyzeMetrics::new(kind, &statistics);
         metrics.subdivision = subdivision;
         if self.discrete_bending {
@@ -55,6 +82,7 @@ impl Analyze {
         outcome.summary.extend(energy_lines(&metrics));
         outcome.warnings.clone_from(&model.warnings);
         outcome.warnings.extend(warnings);
+        outcome.warnings.extend(creases(&model));
         if statistics.singular > 0 {
             outcome.warnings.push(format!(
                 "{} of {} points are singular and have no curvature; they stand for {:.2} % of the area",
@@ -66,7 +94,8 @@ impl Analyze {
         if self.report.wanted() {
             let mut report = report_support::new("Curvature analysis");
             match limit {
-                Some((mesh, surface)) => {
+                Some((mut mesh, surface)) => {
+                    mesh.positions_mut().iter_mut().for_each(|p| *p += center);
                     report.length_unit = model.unit.to_string();
                     let samples = samples_of(&mesh, &surface);
                     report.stages.push(view("limit surface", &samples, &report.length_unit)?);
@@ -79,14 +108,45 @@ impl Analyze {
     }
 }
 
+/// A model moved to the origin, and by what it has been moved away from. One that has no place of
+/// its own stays.
+fn centred(model: &Model) -> (Model, DVec3) {
+    let mut model = model.clone();
+    let mut points: Vec<DVec3> = Vec::new();
+    for named in &model.surfaces {
+        points.extend(named.surface.control_points());
+    }
+    model.meshes.iter().for_each(|mesh| points.extend(&mesh.positions));
+    model.grids.iter().for_each(|grid| points.extend(&grid.points));
+    let Ok(place) = Normalization::of(&points) else { return (model, DVec3::ZERO) };
+    let by = -place.center();
+    for named in &mut model.surfaces {
+        named.surface = named.surface.translated(by);
+    }
+    model.meshes.iter_mut().flat_map(|mesh| &mut mesh.positions).for_each(|p| *p += by);
+    model.grids.iter_mut().flat_map(|grid| &mut grid.points).for_each(|p| *p += by);
+    (model, place.center())
+}
+
 /// What an input is and what it measures.
 struct Measured {
     kind: &'static str,
     statistics: CurvatureStatistics,
     subdivision: Option<SubdivisionMetrics>,
-    /// The subdivision surface with its control mesh.
+    /// The subdivision surface with its control mesh, as the model that was measured stands.
     limit: Option<(PolyMesh, SubdivisionSurface)>,
     warnings: Vec<String>,
+}
+
+/// The creases inside of the surfaces, in words.
+fn creases(model: &Model) -> Vec<String> {
+    let of = |named: &NamedSurface| {
+        let name = if named.name.is_empty() { "surface" } else { &named.name };
+        let found = named.surface.creases(named.trim.as_ref());
+        let split = "split it there before a method that needs smoothness";
+        found.iter().map(|c| format!("{name} has {c}; {split}")).collect::<Vec<_>>()
+    };
+    model.surfaces.iter().flat_map(of).collect()
 }
 
 /// The model without curvatures its file may hold: the page shows those that were measured.
@@ -103,11 +163,7 @@ fn measure(path: &Path, model: &Model, rings: Option<usize>) -> Result<Measured,
     let (mut subdivision, mut warnings) = (None, Vec::new());
     if !model.surfaces.is_empty() {
         for named in &model.surfaces {
-            statistics.merge(&named.surface.curvature_statistics());
-            let name = if named.name.is_empty() { "surface" } else { &named.name };
-            let creases = named.surface.creases();
-            let split = "split it there before a method that needs smoothness";
-            warnings.extend(creases.iter().map(|c| format!("{name} has {c}; {split}")));
+            statistics.merge(&named.curvature_statistics());
         }
         let rational = model.surfaces.iter().any(|named| named.surface.is_rational());
         let kind = if rational { "rational_bspline_surface" } else { "bspline_surface" };
@@ -299,13 +355,19 @@ fn summary(
 ) -> Vec<String> {
     let unit = &model.unit;
     let mut lines = vec![format!("{}: {}", path.display(), kind.replace('_', " "))];
-    for named in &model.surfaces {
+    for named in model.surfaces.iter().take(MOST_LINES) {
         let s = &named.surface;
         let name = if named.name.is_empty() { "surface" } else { &named.name };
         let (d_u, d_v, n_u, n_v) = (s.degree_u(), s.degree_v(), s.n_u(), s.n_v());
-        lines.push(format!("  {name}: degree {d_u} x {d_v}, {n_u} x {n_v} control points"));
+        let trimmed = if named.trim.is_some() { ", trimmed" } else { "" };
+        lines
+            .push(format!("  {name}: degree {d_u} x {d_v}, {n_u} x {n_v} control points{trimmed}"));
     }
-    for mesh in &model.meshes {
+    let more = |n: usize, what: &str| {
+        n.checked_sub(MOST_LINES + 1).map(|n| format!("  and {} more {what}; see --list", n + 1))
+    };
+    lines.extend(more(model.surfaces.len(), "surfaces"));
+    for mesh in model.meshes.iter().take(MOST_LINES) {
         let counts = [
             (mesh.positions.len(), "vertices"),
             (mesh.faces.len(), "faces"),
@@ -316,6 +378,7 @@ fn summary(
         let name = if mesh.name.is_empty() { "mesh" } else { &mesh.name };
         lines.push(format!("  {name}: {}", counts.collect::<Vec<_>>().join(", ")));
     }
+    lines.extend(more(model.meshes.len(), "meshes"));
     if let Some(bounds) = statistics.bounding_box {
         let size = bounds.size();
         lines.push(format!("  size {:.6} x {:.6} x {:.6} {unit}", size.x, size.y, size.z));

@@ -118,7 +118,7 @@ pub(crate) fn spline_view(
         let v = parameters(surface.knots_v(), side);
         let mut jets = surface.jet_grid(&u, &v, 2);
         let middle = [mid(surface.knots_u()), mid(surface.knots_v())];
-        let (poles, curvature) = (surface.pole_sides(), SurfaceCurvature::new(surface).ok());
+        let (poles, curvature) = (surface.pole_sides(None), SurfaceCurvature::new(surface).ok());
         let mut known = BTreeMap::new();
         for (index, jet) in jets.iter_mut().enumerate() {
             let (u, v) = (u[index / v.len()], v[index % v.len()]);

@@ -10,10 +10,21 @@ mod dist;
 mod dist_example;
 mod every_command;
 mod fair;
+mod files;
 mod hard_input;
 mod hyperbolic;
 #[cfg(unix)]
 mod interruptions;
+mod invariance;
 mod panel;
 mod report;
+#[cfg(unix)]
+mod resume;
+mod snapshots;
 mod weingarten;
+
+#[cfg(not(unix))]
+#[test]
+fn interruptions() {
+    eprintln!("SKIPPED interruptions and resume: this platform has no signal for Ctrl-C");
+}
