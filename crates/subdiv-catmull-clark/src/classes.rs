@@ -20,7 +20,7 @@ enum Kind {
     /// A bi-cubic B-spline patch on combinations of local vertices.
     Regular(Box<[Vec<(usize, f64)>; 16]>),
     /// Four sub-patches: class and matrix of the step down to it.
-    Split([(usize, Stencils); 4]),
+    Split(Box<[(usize, Stencils); 4]>),
     /// Being built.
     Pending,
 }
@@ -52,7 +52,7 @@ impl Classes {
                 let [a, b, c, d] = local.children()?;
                 let mut below =
                     |(local, matrix): (LocalPatch, Stencils)| Some((self.insert(&local)?, matrix));
-                Kind::Split([below(a)?, below(b)?, below(c)?, below(d)?])
+                Kind::Split(Box::new([below(a)?, below(b)?, below(c)?, below(d)?]))
             }
         };
         Some(id)

@@ -7,7 +7,7 @@ mod net;
 use crate::splines::{FittedRule, SplinePatchError};
 use bspline::{BsplineSurface, Degree, KnotVector};
 use cap::{CapRule, DEGREE, SIDE};
-use geom_core::{DVec3, FaceId, HalfEdgeId, MeshError, PolyMesh, VertexId};
+use geom_core::{DVec3, FaceId, HalfEdgeId, PolyMesh, VertexId};
 use net::{COARSE, FINE, place};
 use std::collections::BTreeMap;
 use std::collections::btree_map::Entry;
@@ -52,9 +52,6 @@ pub enum LimitPatchError {
          {wanted:.1e}; allow that or refine the mesh once"
     )]
     TooFar { vertex: u32, reached: f64, wanted: f64 },
-    /// A mesh that is not refined.
-    #[error(transparent)]
-    Mesh(#[from] MeshError),
     /// A mesh without a surface.
     #[error(transparent)]
     Subdivision(#[from] SubdivisionError),
