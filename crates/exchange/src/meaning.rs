@@ -3,13 +3,11 @@
 use crate::error::ReadError;
 use crate::model::Model;
 use bspline::{BsplineSurface, KnotVector};
-use geom_core::DVec3;
+use geom_core::{DVec3, Normalization, NormalizationError};
 
 /// Largest coordinate, weight and knot, and one over the smallest size and weight: areas and their
 /// squares then stay within the range of numbers.
-const LARGEST: f64 = 1e60;
-/// A body whose points all agree to this share of their coordinates has no extent.
-const SAME: f64 = 1e-14;
+const LARGEST: f64 = Normalization::LARGEST;
 
 /// Refuses coordinates, weights and knots whose squares overflow or vanish, and surfaces and meshes
 /// whose points all coincide.
@@ -41,25 +39,21 @@ pub(crate) fn check(model: &Model) -> Result<(), ReadError> {
 /// As [`check`], for points under the name `what`; `none` says what has no extent.
 pub(crate) fn check_points(what: &str, none: &str, points: &[DVec3]) -> Result<(), ReadError> {
     check_sizes(what, points)?;
-    let (Some(low), Some(high)) =
-        (points.iter().copied().reduce(DVec3::min), points.iter().copied().reduce(DVec3::max))
-    else {
+    if points.len() < 2 {
         return Ok(());
-    };
-    let (size, far) = ((high - low).max_element(), low.abs().max(high.abs()).max_element());
-    if points.len() > 1 && size <= SAME * far {
-        return Err(ReadError::content(
-            format!("all {none} has no extent"),
-            "check the coordinates",
-        ));
     }
-    if size * LARGEST < 1.0 && points.len() > 1 {
-        return Err(ReadError::content(
+    match Normalization::of(points) {
+        // What is far away has few digits, but it can be looked at and moved.
+        Ok(_) | Err(NormalizationError::TooFar { .. }) => Ok(()),
+        Err(NormalizationError::Size { size }) => Err(ReadError::content(
             format!("all is within {size:e}, and areas of that size vanish"),
             "scale the model up or choose another unit",
-        ));
+        )),
+        Err(_) => {
+            let what = format!("all {none} has no extent");
+            Err(ReadError::content(what, "check the coordinates"))
+        }
     }
-    Ok(())
 }
 
 fn check_sizes(what: &str, points: &[DVec3]) -> Result<(), ReadError> {

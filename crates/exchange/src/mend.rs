@@ -2,9 +2,9 @@
 
 use crate::mesh::{IndexLists, Mesh};
 use crate::model::Model;
-use geom_core::{BoundingBox, DVec3, coinciding_points, faces_to_turn};
+use geom_core::{Ball, DVec3, coinciding_points, faces_to_turn};
 
-/// Corners within this share of a mesh's size are one.
+/// Corners within this share of a mesh's size, the diameter of the smallest ball around it, are one.
 pub const WELD_SHARE: f64 = 1e-9;
 
 impl Model {
@@ -37,7 +37,7 @@ impl Mesh {
         self.faces.iter().flatten().for_each(|&v| used[v as usize] = true);
         let corners = || (0..used.len()).filter(|&v| used[v]);
         let points: Vec<DVec3> = corners().map(|v| self.positions[v]).collect();
-        let size = BoundingBox::of(points.iter().copied()).map_or(0.0, BoundingBox::diagonal);
+        let size = Ball::around(&points).map_or(0.0, |ball| ball.diameter());
         let heads = coinciding_points(&points, WELD_SHARE * size);
         let count = heads.iter().enumerate().filter(|(k, head)| *k as u32 != **head).count();
         if count == 0 {

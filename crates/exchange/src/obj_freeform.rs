@@ -5,7 +5,7 @@ use crate::error::{ReadError, clip};
 use crate::text_number::coordinate;
 use crate::wrapped::{Direction, unwrap, unwrap_curve};
 use bspline::{BsplineCurve, BsplineSurface, Degree, Trim, TrimCurve, TrimLoop};
-use geom_core::DVec3;
+use geom_core::{Budget, DVec3};
 
 /// Ends of trim curves this share of the parameter plane apart are joined.
 const SLACK: f64 = 1e-6;
@@ -71,16 +71,14 @@ pub(crate) struct Reader {
     left: usize,
 }
 
-/// Points that any file may become, and bytes of text per point above that: a number of a vertex
-/// takes two bytes, the control point it stands for dozens.
-const FREE: usize = 1 << 18;
-/// See [`FREE`].
-const BYTES_PER_POINT: usize = 8;
+/// What a point takes with what is made of it: a number of a vertex takes two bytes, the control
+/// point it stands for dozens.
+const POINT_BYTES: usize = 128;
 
 impl Reader {
     /// Sets how much a file of this many bytes may become.
     pub(crate) fn allow(&mut self, bytes: usize) {
-        self.left = FREE + bytes / BYTES_PER_POINT;
+        self.left = Budget::of_file(bytes as u64).model_bytes() / POINT_BYTES;
     }
 
     /// Takes so many points off what may still be made.

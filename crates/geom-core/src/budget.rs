@@ -8,6 +8,8 @@ const READING_BYTES: u64 = 64 << 20;
 const BYTES_PER_FILE_BYTE: u64 = 16;
 /// Bytes of a vertex or a face while it is read: three coordinates, or a list of corners.
 const BYTES_PER_VERTEX: u64 = 24;
+/// Of the memory of a reader one part in so many is for the model.
+const MODEL_SHARE: u64 = 2;
 /// Share of the memory a run may ask for.
 const MEMORY_SHARE: f64 = 0.8;
 /// Core seconds a run may ask for per thread: an hour.
@@ -63,13 +65,26 @@ impl Budget {
         }
     }
 
-    /// Of reading a file of so many bytes: 64 MiB and 16 times the file, and what vertices and
-    /// faces fit into that at 24 bytes each.
+    /// Of reading a file of so many bytes: 64 MiB and 16 times the file, and the vertices and faces
+    /// that fit into what its [model](Self::model_bytes) may take, at 24 bytes each.
     #[must_use]
     pub fn of_file(bytes: u64) -> Self {
         let bytes = READING_BYTES.saturating_add(bytes.saturating_mul(BYTES_PER_FILE_BYTE));
-        let count = (bytes / BYTES_PER_VERTEX).min(u64::from(u32::MAX / 2));
+        let count = (bytes / MODEL_SHARE / BYTES_PER_VERTEX).min(u64::from(u32::MAX / 2));
         Self { bytes, vertices: count, faces: count, evaluations: bytes, threads: 1 }
+    }
+
+    /// What the model of a file may take: half of the memory. The text and the tables on the way to
+    /// it take the other.
+    ///
+    /// # Example
+    /// ```
+    /// use geom_core::Budget;
+    /// assert_eq!(Budget::of_file(1 << 20).model_bytes(), (32 << 20) + 8 * (1 << 20));
+    /// ```
+    #[must_use]
+    pub fn model_bytes(&self) -> usize {
+        usize::try_from(self.bytes / MODEL_SHARE).unwrap_or(usize::MAX)
     }
 
     /// Refuses a cost that exceeds the budget, in the name of the option that asks for it.
@@ -194,6 +209,7 @@ mod tests {
         assert_eq!(budget.threads, Budget::MOST_THREADS);
         let file = Budget::of_file(u64::MAX);
         assert_eq!((file.bytes, file.vertices), (u64::MAX, u64::from(u32::MAX / 2)));
+        assert_eq!(file.model_bytes(), usize::MAX / 2);
         assert!(file.check(Cost { vertices: u64::MAX, ..Cost::default() }, "input").is_err());
     }
 }

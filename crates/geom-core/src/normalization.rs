@@ -6,7 +6,7 @@ use glam::DVec3;
 /// The grid a centre is rounded to, in parts of the size: two to this power.
 const GRID: i32 = -20;
 /// Sizes beyond these have no squares of squares.
-const SIZES: [f64; 2] = [1e-60, 1e60];
+const SIZES: [f64; 2] = [1.0 / Normalization::LARGEST, Normalization::LARGEST];
 
 /// A move and a scaling that bring a model to the origin and to a size between one and two.
 ///
@@ -74,6 +74,9 @@ pub enum NormalizationError {
 }
 
 impl Normalization {
+    /// The largest size, and one over the smallest, in any unit.
+    pub const LARGEST: f64 = 1e60;
+
     /// The normalisation of a model given by its points: the vertices of a mesh, or a grid of points
     /// on a surface.
     ///

@@ -2,15 +2,14 @@
 //! would become hundreds.
 
 use crate::error::ReadError;
+use geom_core::Budget;
 
 /// What an object may become, with what a growing list keeps in reserve.
 pub(super) const BYTES_PER_OBJECT: usize = 2048;
-/// Memory for the objects of any scene.
-const FREE: usize = 32 << 20;
 
-/// Refuses a text with more objects than a file of `bytes` bytes may turn into.
-pub(super) fn check_objects(text: &str, bytes: usize) -> Result<(), ReadError> {
-    let most = (FREE + 8 * bytes) / BYTES_PER_OBJECT;
+/// Refuses a text with more objects than the model of its file may take.
+pub(super) fn check_objects(text: &str, budget: Budget) -> Result<(), ReadError> {
+    let most = budget.model_bytes() / BYTES_PER_OBJECT;
     let (mut count, mut in_text, mut escaped) = (0_usize, false, false);
     for (at, b) in text.bytes().enumerate() {
         match b {
@@ -57,10 +56,11 @@ mod tests {
 
     #[test]
     fn braces_in_texts_do_not_count() {
-        let most = FREE / BYTES_PER_OBJECT;
-        assert!(check_objects(&"{},".repeat(most), 0).is_ok());
-        assert!(check_objects(&format!("\"{}\"", "{\\\"".repeat(2 * most)), 0).is_ok());
-        let error = check_objects(&"{},".repeat(most + 1), 0).unwrap_err().to_string();
+        let budget = Budget::of_file(0);
+        let most = budget.model_bytes() / BYTES_PER_OBJECT;
+        assert!(check_objects(&"{},".repeat(most), budget).is_ok());
+        assert!(check_objects(&format!("\"{}\"", "{\\\"".repeat(2 * most)), budget).is_ok());
+        let error = check_objects(&"{},".repeat(most + 1), budget).unwrap_err().to_string();
         let wanted = "byte 49172: more than 16384 objects describe the scene; join its meshes";
         assert!(error.starts_with(wanted), "{error}");
     }

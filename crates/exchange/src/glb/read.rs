@@ -8,7 +8,7 @@ use crate::mesh::{Field, Group, Mesh};
 use crate::model::Model;
 use crate::ron_text::MAX_DEPTH;
 use crate::unit::LengthUnit;
-use geom_core::DVec3;
+use geom_core::{Budget, DVec3};
 use glam::{DMat4, DQuat};
 use gltf::json::Root;
 use gltf::json::validation::Checked::Valid;
@@ -20,8 +20,6 @@ use std::collections::BTreeMap;
 
 /// The largest JSON part that is read: the description of a scene, not its coordinates.
 const MOST_JSON: usize = 4 << 20;
-/// Vertices and corners of all meshes may take this many bytes, and eight times the file.
-const MOST_BYTES: usize = 32 << 20;
 /// Bytes of a vertex with its normal and colour.
 const PER_VERTEX: usize = 24 + 24 + 12;
 /// Bytes of a corner of a triangle, with its share of what else a face takes.
@@ -69,7 +67,8 @@ impl Placement {
 pub fn read_glb(bytes: &[u8]) -> Result<Model, ReadError> {
     let (text, binary) = chunks(bytes)?;
     check_depth(text)?;
-    check_objects(text, bytes.len())?;
+    let budget = Budget::of_file(bytes.len() as u64);
+    check_objects(text, budget)?;
     let root: Root = serde_json::from_str(text).map_err(|e| fault(&e))?;
     let placements: Placements = serde_json::from_str(text).map_err(|e| fault(&e))?;
     if let Some(extension) = root.extensions_required.first() {
@@ -93,8 +92,7 @@ pub fn read_glb(bytes: &[u8]) -> Result<Model, ReadError> {
     for root in roots {
         scene.walk(root, upright, &mut visited, 0)?;
     }
-    let budget = MOST_BYTES.saturating_add(bytes.len().saturating_mul(8));
-    scene.check_size(budget)?;
+    scene.check_size(budget.model_bytes())?;
     let mut meshes = Vec::new();
     for (node, place) in &scene.placed {
         let Some(node) = document.nodes().nth(*node) else { continue };

@@ -1,10 +1,10 @@
 //! The faces of a Brep: surfaces with loops of curves in their parameter planes and in space.
 
-use super::budget::Budget;
 use super::codes::ANONYMOUS;
 use super::cursor::Cursor;
 use super::curve_read::{Curve, curve_object};
 use super::lost::Lost;
+use super::points::Points;
 use super::surface_read::{Surface, surface_object};
 use crate::error::ReadError;
 use bspline::{BsplineCurve, BsplineSurface, Carrier, FaceEdge, Trim, TrimCurve, TrimLoop};
@@ -58,7 +58,7 @@ struct Brep {
 /// All faces of the data of a Brep of version 3, and for each that cannot be read the reason.
 pub(super) fn brep_data(
     mut data: Cursor<'_>,
-    budget: &mut Budget,
+    budget: &mut Points,
 ) -> Result<Vec<Result<Face, Lost>>, Lost> {
     let (major, _) = data.version()?;
     if major != 3 {
@@ -172,7 +172,7 @@ fn named<T>(list: &[Result<T, Lost>], index: Option<usize>) -> Result<&T, Lost> 
 }
 
 impl Brep {
-    fn face(&self, text: &FaceText, budget: &mut Budget, at: &Cursor<'_>) -> Result<Face, Lost> {
+    fn face(&self, text: &FaceText, budget: &mut Points, at: &Cursor<'_>) -> Result<Face, Lost> {
         let surface = named(&self.surfaces, text.surface)?;
         budget.spend(surface.spline.control_points().len(), at)?;
         let mut loops = Vec::with_capacity(text.loops.len());

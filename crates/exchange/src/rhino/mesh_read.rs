@@ -1,14 +1,14 @@
 //! Meshes and clouds of points.
 
-use super::budget::Budget;
 use super::cursor::Cursor;
 use super::lost::Lost;
+use super::points::Points;
 use crate::color::linear;
 use crate::mesh::{IndexLists, Mesh};
 use geom_core::DVec3;
 
 /// The data of a mesh of version 3.
-pub(super) fn mesh_data(mut data: Cursor<'_>, budget: &mut Budget) -> Result<Mesh, Lost> {
+pub(super) fn mesh_data(mut data: Cursor<'_>, budget: &mut Points) -> Result<Mesh, Lost> {
     let (major, minor) = data.version()?;
     if major != 3 {
         return Err(Lost::Unsound(format!("a mesh of version {major}")));

@@ -2,7 +2,6 @@
 
 mod brep_read;
 mod brep_write;
-mod budget;
 mod chunks;
 mod codes;
 mod cursor;
@@ -10,6 +9,7 @@ mod curve_read;
 mod lost;
 mod mesh_read;
 mod mesh_write;
+mod points;
 mod read;
 mod spline_write;
 mod surface_read;

@@ -1,7 +1,6 @@
 //! Reading: the unit, the layers, and the objects with what they are called.
 
 use super::brep_read::brep_data;
-use super::budget::Budget;
 use super::codes::{
     ATTRIBUTES, BREP, CUSTOM_UNIT, ClassId, LAYER, LAYERS, MESH, OBJECT, OBJECTS, POINT,
     POINT_CLOUD, RARE_UNITS, SETTINGS, UNITS, class_name, numbered_unit,
@@ -10,6 +9,7 @@ use super::cursor::Cursor;
 use super::curve_read::{Curve, curve_object, is_curve};
 use super::lost::Lost;
 use super::mesh_read::{cloud_data, mesh_data};
+use super::points::Points;
 use super::surface_read::{is_surface, surface_data};
 use crate::color::linear;
 use crate::error::ReadError;
@@ -51,7 +51,7 @@ pub fn read_3dm(bytes: &[u8]) -> Result<Model, ReadError> {
     let mut reader = Reader {
         model: Model::default(),
         layers: BTreeMap::new(),
-        budget: Budget::new(bytes.len()),
+        budget: Points::new(bytes.len()),
         left_out: BTreeMap::new(),
         unsound: BTreeMap::new(),
         sampled: 0,
@@ -72,7 +72,7 @@ struct Reader {
     model: Model,
     /// Names by number.
     layers: BTreeMap<usize, String>,
-    budget: Budget,
+    budget: Points,
     left_out: BTreeMap<&'static str, usize>,
     /// Numbers of objects, with the first reason.
     unsound: BTreeMap<&'static str, (usize, String)>,

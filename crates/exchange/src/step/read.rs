@@ -9,17 +9,13 @@ use super::units::Context;
 use crate::error::ReadError;
 use crate::model::{Model, NamedSurface};
 use crate::ron_text::MAX_DEPTH;
-use geom_core::DMat3;
+use geom_core::{Budget, DMat3};
 use glam::DAffine3;
 use std::collections::{BTreeMap, HashMap, HashSet};
 use std::rc::Rc;
 
 /// Bytes of a control point with its weight.
 const POINT_BYTES: usize = 32;
-/// What the surfaces may need together, beside this share of the size of the file.
-const LEAST_MEMORY: usize = 32 << 20;
-/// See [`LEAST_MEMORY`].
-const MEMORY_RATIO: usize = 12;
 /// Control points that the visit of a placed part counts as.
 const VISIT: usize = 16;
 /// Reasons for lost faces that are told in full.
@@ -48,7 +44,7 @@ pub fn read_step(text: &[u8]) -> Result<Model, ReadError> {
         shared: HashMap::new(),
         groups: HashMap::new(),
         seen: HashSet::new(),
-        budget: (LEAST_MEMORY + MEMORY_RATIO * text.len()) / POINT_BYTES,
+        budget: Budget::of_file(text.len() as u64).model_bytes() / POINT_BYTES,
         tally: Tally::default(),
     };
     reader.find_mapped()?;

@@ -2,21 +2,20 @@
 
 use super::cursor::Cursor;
 use crate::error::ReadError;
+use geom_core::Budget;
 
-/// Points that any file may become, and points per byte above that.
-const FREE: usize = 1 << 20;
-/// See [`FREE`]; a point takes 24 bytes.
-const POINTS_PER_BYTE: f64 = 0.25;
+/// Bytes of a control point with its weight.
+const POINT_BYTES: usize = 32;
 
 /// The points that are still to be had.
-pub(super) struct Budget {
+pub(super) struct Points {
     left: usize,
 }
 
-impl Budget {
+impl Points {
     /// For a file of this many bytes.
     pub(super) fn new(bytes: usize) -> Self {
-        Self { left: FREE + (bytes as f64 * POINTS_PER_BYTE) as usize }
+        Self { left: Budget::of_file(bytes as u64).model_bytes() / POINT_BYTES }
     }
 
     /// Takes so many points.
