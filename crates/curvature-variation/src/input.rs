@@ -1,7 +1,7 @@
 //! What is faired.
 
 use geom_core::{Cost, PolyMesh};
-use subdiv_catmull_clark::{Creases, INFINITE_SHARPNESS};
+use subdiv_catmull_clark::{Creases, INFINITE_SHARPNESS, MAX_VALENCE};
 
 use crate::constraints::Constraints;
 use crate::error::Error;
@@ -85,8 +85,10 @@ impl Input {
             edges[mesh.target(h).index()] += 1;
         }
         let corners = mesh.faces().map(|f| mesh.face_degree(f) as u64);
-        for valence in edges.into_iter().chain(corners).filter(|&n| n > 4) {
-            let unknowns = (3 * (6 * valence.min(10_000) + 1)).pow(2);
+        // Larger ones are refused whatever they would take.
+        let blended = |n: &u64| (5..=MAX_VALENCE as u64).contains(n);
+        for valence in edges.into_iter().chain(corners).filter(blended) {
+            let unknowns = (3 * (6 * valence + 1)).pow(2);
             let per_patch = (options.quadrature.extraordinary as u64).pow(2);
             let nodes = valence.saturating_mul(per_patch);
             let flops = unknowns.saturating_mul(nodes) / 2;
