@@ -1,7 +1,7 @@
 //! What is faired.
 
 use geom_core::{Cost, PolyMesh};
-use subdiv_catmull_clark::{Creases, INFINITE_SHARPNESS, MAX_VALENCE};
+use subdiv_catmull_clark::{Creases, INFINITE_SHARPNESS, check_valences};
 
 use crate::constraints::Constraints;
 use crate::error::Error;
@@ -66,9 +66,13 @@ const FLOPS_PER_EVALUATION: u64 = 8000;
 impl Input {
     /// What a run would take, roughly: in proportion to the vertices of the last level, and what
     /// blends take in whose dense matrices all points around a vertex depend on one another.
-    #[must_use]
-    pub fn cost(&self, options: &Options) -> Cost {
+    ///
+    /// # Errors
+    /// [`Error::Subdivision`] for a mesh that is not evaluated at any cost: a vertex with too many
+    /// edges, or a face with too many corners.
+    pub fn cost(&self, options: &Options) -> Result<Cost, Error> {
         let mesh = &self.mesh;
+        check_valences(mesh)?;
         let steps = options.iterations.min(USUAL_STEPS) as u64;
         let finer = (2 * options.levels).min(32) as u32;
         let count = mesh.vertex_count() + mesh.edge_count() + mesh.face_count();
@@ -85,9 +89,7 @@ impl Input {
             edges[mesh.target(h).index()] += 1;
         }
         let corners = mesh.faces().map(|f| mesh.face_degree(f) as u64);
-        // Larger ones are refused whatever they would take.
-        let blended = |n: &u64| (5..=MAX_VALENCE as u64).contains(n);
-        for valence in edges.into_iter().chain(corners).filter(blended) {
+        for valence in edges.into_iter().chain(corners).filter(|&n| n > 4) {
             let unknowns = (3 * (6 * valence + 1)).pow(2);
             let per_patch = (options.quadrature.extraordinary as u64).pow(2);
             let nodes = valence.saturating_mul(per_patch);
@@ -96,7 +98,7 @@ impl Input {
             cost.evaluations =
                 cost.evaluations.saturating_add(flops / FLOPS_PER_EVALUATION * steps);
         }
-        cost
+        Ok(cost)
     }
 
     /// The constraints, with the boundary clamped if the options say so.

@@ -82,7 +82,8 @@ impl Fair {
         let mut model =
             input_file::read(context, &self.input, &SurfaceArgs::default(), &self.part)?;
         let input = self.read(&mut model)?;
-        context.afford(input.cost(&options), "levels")?;
+        let cost = input.cost(&options).map_err(|e| refused::<Options>(&self.input, e))?;
+        context.afford(cost, "levels")?;
         let mut result = solve(&input, &options, &mut watch).map_err(|e| match e {
             Error::Solver(e @ SolverError::ForeignCheckpoint { .. }) => watch.foreign(&e),
             e => refused::<Options>(&self.input, e),

@@ -116,7 +116,8 @@ fn vertices_of_many_edges_are_measured_in_time() {
         // Once it took two minutes for 100 edges; now it is a moment, on a busy machine too.
         assert!(start.elapsed() < Duration::from_secs(20), "{n}: {:?}", start.elapsed());
         assert_eq!(metrics["kind"], "subdivision_surface", "{n}");
-        assert_eq!(number(&metrics, "patches"), n as f64);
+        // Refined once, so that the border is away from the middle.
+        assert_eq!(number(&metrics, "patches"), 4.0 * n as f64);
         // The limit of a tent with this symmetry lies within its control points.
         let area = number(&metrics, "area");
         assert!(area > 0.9 && area < 4.0, "{n}: {area}");
