@@ -63,7 +63,12 @@ impl BsplineSurface {
     #[must_use]
     pub fn creases(&self, trim: Option<&Trim>) -> Vec<Crease> {
         let region = trim.map(|trim| Region::new(trim, self));
-        let counts = |[u, v]: [f64; 2]| region.as_ref().is_none_or(|region| region.contains(u, v));
+        // At a pole the tangents of either side may be noise.
+        let poles = self.pole_sides(None);
+        let counts = |at: [f64; 2]| {
+            let [u, v] = at;
+            !self.is_on_pole(&poles, at) && region.as_ref().is_none_or(|r| r.contains(u, v))
+        };
         let turn = |c: Crease| Crease { constant_u: false, at: [c.at[1], c.at[0]], ..c };
         let across_v = creases_across_u(&self.swapped(), |[v, u]| counts([u, v]));
         let across_v = across_v.into_iter().map(turn);
@@ -128,7 +133,7 @@ fn places(knots: &KnotVector) -> Vec<f64> {
 mod tests {
     use super::*;
     use crate::{ArcSpans, Axis, BsplineCurve, Degree};
-    use std::f64::consts::TAU;
+    use std::f64::consts::{FRAC_PI_2, TAU};
 
     #[test]
     fn exact_arcs_have_knots_of_full_multiplicity_but_no_crease() {
@@ -138,6 +143,14 @@ mod tests {
         let torus = BsplineSurface::revolution(&ring, axis, spans).unwrap();
         assert!(torus.knots_u().multiplicities().len() > 2);
         assert_eq!(torus.creases(None), []);
+        // Nor have they one at a pole that is collapsed to rounding only.
+        let meridian = ArcSpans::new(-FRAC_PI_2, FRAC_PI_2);
+        let half = BsplineCurve::arc(DVec3::ZERO, 50.0 * DVec3::X, 50.0 * DVec3::Z, meridian);
+        let sphere = BsplineSurface::revolution(&half.unwrap(), axis, spans).unwrap();
+        let off = |k: usize| 3e-15 * DVec3::new((k as f64).sin(), (2.0 * k as f64).cos(), 0.3);
+        let points = sphere.control_points().iter().enumerate().map(|(k, p)| *p + off(k)).collect();
+        let rounded = sphere.with_control_points(points).unwrap();
+        assert_eq!((sphere.creases(None), rounded.creases(None)), (vec![], vec![]));
     }
 
     #[test]
