@@ -81,13 +81,12 @@ fn a_crease_inside_a_surface_is_named_and_refused_by_what_needs_smoothness() {
     refused(&["panel", file, "-o", &out], "a crease of 33.4 degrees along");
 }
 
-/// A tent over a regular polygon: `n` quads around one vertex, as OBJ.
+/// A regular polygon of `n` quads around one vertex, as OBJ.
 fn fan(n: usize) -> String {
-    let mut text = "v 0 0 1\n".to_owned();
+    let mut text = "v 0 0 0\n".to_owned();
     for k in 0..2 * n {
         let angle = TAU * k as f64 / (2 * n) as f64;
-        let height = if k % 2 == 0 { 0.5 } else { 0.0 };
-        writeln!(text, "v {} {} {height}", angle.cos(), angle.sin()).expect("a text");
+        writeln!(text, "v {} {} 0", angle.cos(), angle.sin()).expect("a text");
     }
     for k in 0..n {
         let next = if k + 1 == n { 2 } else { 2 * k + 4 };
@@ -119,9 +118,16 @@ fn vertices_of_many_edges_are_measured_in_time() {
         assert_eq!(metrics["kind"], "subdivision_surface", "{n}");
         // Refined once, so that the border is away from the middle.
         assert_eq!(number(&metrics, "patches"), 4.0 * n as f64);
-        // The limit of a tent with this symmetry lies within its control points.
+        // Plane, and the inside of a uniform cubic B-spline over a regular polygon: its area is that
+        // of the polygons through every corner, every second and every third, in these shares. The
+        // rule with few points loses a thousandth where all sectors meet.
+        let m = 2.0 * n as f64;
+        let sine = |step: f64| (step * TAU / m).sin();
+        let want = m * (245.0 * sine(1.0) + 56.0 * sine(2.0) + sine(3.0)) / 720.0;
         let area = number(&metrics, "area");
-        assert!(area > 0.9 && area < 4.0, "{n}: {area}");
+        assert!((area / want - 1.0).abs() < 1e-3, "{n}: {area}, not {want}");
+        assert!(number(&metrics, "mean_curvature_max").abs() < 1e-9);
+        assert!(number(&metrics, "gaussian_curvature_min").abs() < 1e-9);
     }
 }
 
@@ -135,8 +141,10 @@ fn what_is_beyond_the_largest_valence_is_said() {
     assert!(metrics["kind"] != "subdivision_surface" && said.contains("201 edges"), "{said}");
     let file = write_into(&folder, "polygon.obj", &polygon(20_000));
     refused(&["fair", &file, "-o", &out], "face 0 has 20000 corners");
-    let (_, said) = measured(&file);
-    assert!(!said.contains("panicked"), "{said}");
+    // Vertices on a circle say nothing of curvature.
+    let file = write_into(&folder, "polygon.obj", &polygon(2_000));
+    let (metrics, said) = measured(&file);
+    assert!(metrics["kind"] != "subdivision_surface" && said.contains("no curvature"), "{said}");
 }
 
 #[test]
