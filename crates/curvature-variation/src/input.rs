@@ -1,7 +1,7 @@
 //! What is faired.
 
 use geom_core::{Cost, PolyMesh};
-use subdiv_catmull_clark::{Creases, INFINITE_SHARPNESS, check_valences};
+use subdiv_catmull_clark::{Creases, INFINITE_SHARPNESS, check_valences, refinements_needed};
 
 use crate::constraints::Constraints;
 use crate::error::Error;
@@ -74,9 +74,13 @@ impl Input {
         let mesh = &self.mesh;
         check_valences(mesh)?;
         let steps = options.iterations.min(USUAL_STEPS) as u64;
-        let finer = (2 * options.levels).min(32) as u32;
-        let count = mesh.vertex_count() + mesh.edge_count() + mesh.face_count();
-        let vertices = (count as u64).saturating_mul(4_u64.pow(finer.min(16)));
+        // Of the mesh refined once; every further refinement has about four times as many.
+        let once = (mesh.vertex_count() + mesh.edge_count() + mesh.face_count()) as u64;
+        let refinements = refinements_needed(mesh, &self.creases) + options.levels;
+        let vertices = match refinements.checked_sub(1) {
+            Some(further) => once.saturating_mul(4_u64.pow(further.min(16) as u32)),
+            None => mesh.vertex_count() as u64,
+        };
         let mut cost = Cost {
             bytes: vertices.saturating_mul(BYTES_PER_VERTEX),
             vertices,
