@@ -93,14 +93,15 @@ pub fn read_glb(bytes: &[u8]) -> Result<Model, ReadError> {
     for root in roots {
         scene.walk(root, upright, &mut visited, 0)?;
     }
+    let numbers = Numbers { binary };
     let budget = MOST_BYTES.saturating_add(bytes.len().saturating_mul(8));
-    scene.check_size(budget)?;
+    scene.check_size(numbers, budget)?;
     let mut meshes = Vec::new();
     for (node, place) in &scene.placed {
         let Some(node) = document.nodes().nth(*node) else { continue };
         if let Some(mesh) = node.mesh() {
             let name = node.name().unwrap_or_default();
-            meshes.extend(placed_mesh(&mesh, name, *place, Numbers { binary })?);
+            meshes.extend(placed_mesh(&mesh, name, *place, numbers)?);
         }
     }
     if meshes.is_empty() {
@@ -208,11 +209,14 @@ impl Scene<'_> {
     }
 
     /// Refuses scenes that place their meshes too often, before anything is built.
-    fn check_size(&self, budget: usize) -> Result<(), ReadError> {
+    fn check_size(&self, numbers: Numbers<'_>, budget: usize) -> Result<(), ReadError> {
         let mut sizes: BTreeMap<usize, usize> = BTreeMap::new();
         for mesh in self.document.meshes() {
             let mut bytes = 0_usize;
             for primitive in mesh.primitives() {
+                // A count beyond the data is no size.
+                let counts = [primitive.get(&Semantic::Positions), primitive.indices()];
+                counts.iter().flatten().try_for_each(|a| numbers.check(a))?;
                 let vertices = primitive.get(&Semantic::Positions).map_or(0, |a| a.count());
                 let corners = primitive.indices().map_or(vertices, |a| a.count());
                 // A strip has three corners per index.
