@@ -2,7 +2,7 @@
 
 use std::time::Instant;
 
-use geom_core::PolyMesh;
+use geom_core::{DVec3, PolyMesh};
 use gp_solver::{
     Euclidean, Extra, LbfgsOptions, Objective, Observer, Problem, Report, RunReport, Stage,
     StageReport, Status, Variables, lbfgs,
@@ -82,6 +82,7 @@ pub(crate) fn problem(input: &Input, options: &Options) -> Result<Problem<'stati
 pub(crate) fn solve(
     input: &Input,
     options: &Options,
+    origin: DVec3,
     extra: Option<&mut Extra<'_, Error>>,
     observer: &mut dyn Observer,
 ) -> Result<Solution, Error> {
@@ -90,7 +91,7 @@ pub(crate) fn solve(
     let Family { mesh, base, directions, surface } = &family;
     let (fingerprint, resume) = (input.fingerprint(options), observer.resume());
     let answers = Answers::resumed(fingerprint, resume.as_ref(), directions.len())?;
-    let stage = Stage::only("family");
+    let stage = Stage::only("family").at(origin.to_array(), 1.0);
     let (mut added, mut weight) = (None, 1.0);
     if let Some(extra) = extra {
         let mut problem = family.problem(options);

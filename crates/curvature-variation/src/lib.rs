@@ -21,6 +21,7 @@
 mod analysis;
 pub mod blocks;
 mod cad;
+mod centred;
 mod checkpoint;
 mod constraints;
 mod density;
