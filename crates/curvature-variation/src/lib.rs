@@ -21,7 +21,6 @@
 mod analysis;
 pub mod blocks;
 mod cad;
-mod centred;
 mod checkpoint;
 mod constraints;
 mod density;
@@ -46,6 +45,7 @@ mod limits;
 mod metric;
 mod metrics;
 mod options;
+mod placed;
 mod replay;
 mod rules;
 mod samples;

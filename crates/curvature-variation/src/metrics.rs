@@ -84,6 +84,18 @@ pub struct Metrics {
     pub written_energies: Option<BTreeMap<&'static str, f64>>,
 }
 
+impl Metrics {
+    /// The numbers when every length is `factor` times what it was.
+    pub(crate) fn scale_lengths(&mut self, factor: f64) {
+        for functional in Functional::ALL {
+            if let Some(value) = self.energies.get_mut(functional.name()) {
+                *value *= factor.powi(functional.length_power());
+            }
+        }
+        self.torus_fit_rms = self.torus_fit_rms.map(|rms| rms * factor);
+    }
+}
+
 /// What the user should know although there is a result.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]

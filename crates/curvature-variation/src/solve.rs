@@ -2,7 +2,6 @@
 
 use gp_solver::{Checkpoint, Extra, Observer, Problem, RunReport, Stage, Status};
 
-use crate::centred::Centred;
 use crate::checkpoint::{METHOD, levels_of, stage_name, with_levels};
 use crate::error::Error;
 use crate::evaluator::{EnergyTable, unflatten};
@@ -14,6 +13,7 @@ use crate::level::{Begin, LevelNumbers, solve_level};
 use crate::limits::{conditions, pulled_places, pulls};
 use crate::metrics::{Measured, Meter};
 use crate::options::Options;
+use crate::placed::Placed;
 use crate::schedule::Control;
 use crate::solution::Solution;
 use crate::variables::{control_points, fixed_vertices};
@@ -22,8 +22,8 @@ use crate::variables::{control_points, fixed_vertices};
 ///
 /// The mesh is refined until all faces are quads with regular rings around extraordinary
 /// vertices, minimised, refined and minimised again `levels` times. The result keeps the input's
-/// place and, where nothing holds it, the input's area; it is faired around the origin, so that its
-/// place costs no digits. With further members the fairest mesh of
+/// place and, where nothing holds it, the input's area; it is faired around the origin and about one
+/// unit large, so that neither its place nor its unit matters. With further members the fairest mesh of
 /// their family is found instead, see [`Input::members`].
 ///
 /// Checkpoints are offered at the start of every level, after every Gauss-Newton step and after every
@@ -106,8 +106,7 @@ pub fn solve_with(
 /// ```
 pub fn problem(input: &Input, options: &Options) -> Result<Problem<'static>, Error> {
     input.check(options)?;
-    let centred = Centred::new(input)?;
-    let input = &*centred.input;
+    let Placed { input, options, .. } = &Placed::new(input, options)?;
     if !input.members.is_empty() {
         return family::problem(input, options);
     }
@@ -128,13 +127,12 @@ fn run(
     observer: &mut dyn Observer,
 ) -> Result<Solution, Error> {
     input.check(options)?;
-    let centred = Centred::new(input)?;
-    let solution = if input.members.is_empty() {
-        fair(&centred, options, extra, observer)
+    let placed = Placed::new(input, options)?;
+    placed.back(if input.members.is_empty() {
+        fair(&placed, extra, observer)
     } else {
-        family::solve(&centred.input, options, centred.origin(), extra, observer)
-    };
-    Ok(centred.back(solution?))
+        family::solve(&placed, extra, observer)
+    })
 }
 
 /// What all levels share, with the energies before anything moved.
@@ -163,12 +161,11 @@ fn meter<'o>(input: &Input, options: &'o Options) -> Meter<'o> {
 }
 
 fn fair(
-    centred: &Centred<'_>,
-    options: &Options,
+    placed: &Placed<'_>,
     mut extra: Option<&mut Extra<'_, Error>>,
     observer: &mut dyn Observer,
 ) -> Result<Solution, Error> {
-    let input = &*centred.input;
+    let Placed { input, options, .. } = placed;
     let fingerprint = input.fingerprint(options);
     let resume = observer.resume();
     if let Some(checkpoint) = &resume {
@@ -198,8 +195,8 @@ fn fair(
             let start = checkpoint.numbers("start", 3 * control.mesh.vertex_count())?;
             control.mesh.positions_mut().copy_from_slice(&unflatten(start));
         }
-        let stage = Stage::new(stage_name(control.mesh.vertex_count()), level, count)
-            .at(centred.origin().to_array(), 1.0);
+        let name = stage_name(control.mesh.vertex_count());
+        let stage = placed.stage(Stage::new(name, level, count));
         let frame = |state: Checkpoint| {
             let state = Checkpoint { method: METHOD.to_owned(), fingerprint, ..state };
             with_levels(state, &stages, &numbers)

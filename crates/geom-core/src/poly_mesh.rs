@@ -2,6 +2,7 @@
 
 use glam::DVec3;
 use std::collections::HashMap;
+use std::sync::Arc;
 
 /// Index of a vertex of a [`PolyMesh`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
@@ -118,6 +119,13 @@ const NAMED_FACES: usize = 8;
 #[derive(Clone, Debug, PartialEq)]
 pub struct PolyMesh {
     positions: Vec<DVec3>,
+    /// Shared by all copies of a mesh: a copy costs its positions.
+    links: Arc<Links>,
+}
+
+/// The connectivity: half-edges by number.
+#[derive(Debug, PartialEq)]
+struct Links {
     origin: Vec<u32>,
     next: Vec<u32>,
     prev: Vec<u32>,
@@ -129,20 +137,14 @@ pub struct PolyMesh {
     outgoing: Vec<u32>,
 }
 
-impl PolyMesh {
-    /// Builds the connectivity of `faces` (corners counter-clockwise seen from outside).
-    ///
-    /// # Errors
-    /// [`MeshError`] names the first face, edge or vertex at fault.
-    pub fn new<F: AsRef<[u32]>>(positions: Vec<DVec3>, faces: &[F]) -> Result<Self, MeshError> {
-        check_faces(&positions, faces)?;
+impl Links {
+    fn new<F: AsRef<[u32]>>(vertices: usize, faces: &[F]) -> Result<Self, MeshError> {
         let corners: usize = faces.iter().map(|f| f.as_ref().len()).sum();
         if corners > (u32::MAX / 2) as usize {
             return Err(MeshError::TooLarge { corners });
         }
-        let mut mesh = Self {
-            outgoing: vec![NONE; positions.len()],
-            positions,
+        let mut links = Self {
+            outgoing: vec![NONE; vertices],
             origin: Vec::with_capacity(corners),
             next: Vec::with_capacity(corners),
             prev: Vec::with_capacity(corners),
@@ -150,11 +152,11 @@ impl PolyMesh {
             face: Vec::with_capacity(corners),
             face_start: Vec::with_capacity(faces.len() + 1),
         };
-        mesh.push_faces(faces);
-        mesh.match_twins()?;
-        mesh.close_boundaries()?;
-        mesh.choose_outgoing()?;
-        Ok(mesh)
+        links.push_faces(faces);
+        links.match_twins()?;
+        links.close_boundaries()?;
+        links.choose_outgoing()?;
+        Ok(links)
     }
 
     fn push_faces<F: AsRef<[u32]>>(&mut self, faces: &[F]) {
@@ -236,7 +238,7 @@ impl PolyMesh {
     }
 
     fn choose_outgoing(&mut self) -> Result<(), MeshError> {
-        let mut degree = vec![0_u32; self.positions.len()];
+        let mut degree = vec![0_u32; self.outgoing.len()];
         for h in 0..self.origin.len() {
             let v = self.origin[h] as usize;
             degree[v] += 1;
@@ -244,13 +246,30 @@ impl PolyMesh {
                 self.outgoing[v] = h as u32;
             }
         }
-        for v in 0..self.positions.len() {
-            let reached = self.outgoing_half_edges(VertexId(v as u32)).count();
-            if reached != degree[v] as usize {
+        for (v, &first) in self.outgoing.iter().enumerate() {
+            // All half-edges around a vertex are met from one of them.
+            let around = |&h: &u32| {
+                let following = self.next[self.twin[h as usize] as usize];
+                (following != first).then_some(following)
+            };
+            let begin = (first != NONE).then_some(first);
+            if std::iter::successors(begin, around).count() != degree[v] as usize {
                 return Err(MeshError::NonManifoldVertex { vertex: v });
             }
         }
         Ok(())
+    }
+}
+
+impl PolyMesh {
+    /// Builds the connectivity of `faces` (corners counter-clockwise seen from outside).
+    ///
+    /// # Errors
+    /// [`MeshError`] names the first face, edge or vertex at fault.
+    pub fn new<F: AsRef<[u32]>>(positions: Vec<DVec3>, faces: &[F]) -> Result<Self, MeshError> {
+        check_faces(&positions, faces)?;
+        let links = Arc::new(Links::new(positions.len(), faces)?);
+        Ok(Self { positions, links })
     }
 
     /// Number of vertices.
@@ -262,19 +281,19 @@ impl PolyMesh {
     /// Number of faces.
     #[must_use]
     pub fn face_count(&self) -> usize {
-        self.face_start.len() - 1
+        self.links.face_start.len() - 1
     }
 
     /// Number of half-edges, those along the boundary included.
     #[must_use]
     pub fn half_edge_count(&self) -> usize {
-        self.origin.len()
+        self.links.origin.len()
     }
 
     /// Number of edges.
     #[must_use]
     pub fn edge_count(&self) -> usize {
-        self.origin.len() / 2
+        self.links.origin.len() / 2
     }
 
     /// Positions, indexed by vertex.
@@ -306,31 +325,33 @@ impl PolyMesh {
 
     /// One half-edge per edge: the one with the smaller index, so never one along the boundary.
     pub fn edges(&self) -> impl Iterator<Item = HalfEdgeId> + '_ {
-        (0..self.origin.len() as u32).filter(|&h| h < self.twin[h as usize]).map(HalfEdgeId)
+        (0..self.links.origin.len() as u32)
+            .filter(|&h| h < self.links.twin[h as usize])
+            .map(HalfEdgeId)
     }
 
     /// The next half-edge around the face or boundary loop.
     #[must_use]
     pub fn next(&self, h: HalfEdgeId) -> HalfEdgeId {
-        HalfEdgeId(self.next[h.index()])
+        HalfEdgeId(self.links.next[h.index()])
     }
 
     /// The previous half-edge around the face or boundary loop.
     #[must_use]
     pub fn prev(&self, h: HalfEdgeId) -> HalfEdgeId {
-        HalfEdgeId(self.prev[h.index()])
+        HalfEdgeId(self.links.prev[h.index()])
     }
 
     /// The half-edge of the same edge in the other direction.
     #[must_use]
     pub fn twin(&self, h: HalfEdgeId) -> HalfEdgeId {
-        HalfEdgeId(self.twin[h.index()])
+        HalfEdgeId(self.links.twin[h.index()])
     }
 
     /// The vertex the half-edge leaves.
     #[must_use]
     pub fn origin(&self, h: HalfEdgeId) -> VertexId {
-        VertexId(self.origin[h.index()])
+        VertexId(self.links.origin[h.index()])
     }
 
     /// The vertex the half-edge enters.
@@ -342,19 +363,19 @@ impl PolyMesh {
     /// The face on the left, or `None` along the boundary.
     #[must_use]
     pub fn face(&self, h: HalfEdgeId) -> Option<FaceId> {
-        let face = self.face[h.index()];
+        let face = self.links.face[h.index()];
         (face != NONE).then_some(FaceId(face))
     }
 
     /// The half-edge that leaves the first corner of a face.
     #[must_use]
     pub fn face_half_edge(&self, f: FaceId) -> HalfEdgeId {
-        HalfEdgeId(self.face_start[f.index()])
+        HalfEdgeId(self.links.face_start[f.index()])
     }
 
     /// Half-edges of a face, from its first corner on.
     pub fn face_half_edges(&self, f: FaceId) -> impl ExactSizeIterator<Item = HalfEdgeId> + use<> {
-        (self.face_start[f.index()]..self.face_start[f.index() + 1]).map(HalfEdgeId)
+        (self.links.face_start[f.index()]..self.links.face_start[f.index() + 1]).map(HalfEdgeId)
     }
 
     /// Corners of a face, in the order given to `new`.
@@ -370,14 +391,15 @@ impl PolyMesh {
     /// ```
     #[must_use]
     pub fn face_vertices(&self, f: FaceId) -> FaceCorners<'_> {
-        let range = self.face_start[f.index()] as usize..self.face_start[f.index() + 1] as usize;
-        FaceCorners(self.origin[range].iter())
+        let range = self.links.face_start[f.index()] as usize
+            ..self.links.face_start[f.index() + 1] as usize;
+        FaceCorners(self.links.origin[range].iter())
     }
 
     /// Number of corners of a face.
     #[must_use]
     pub fn face_degree(&self, f: FaceId) -> usize {
-        (self.face_start[f.index() + 1] - self.face_start[f.index()]) as usize
+        (self.links.face_start[f.index() + 1] - self.links.face_start[f.index()]) as usize
     }
 
     /// Whether every face has four corners.
@@ -390,7 +412,7 @@ impl PolyMesh {
     /// boundary it is the half-edge that leaves along the boundary loop.
     #[must_use]
     pub fn outgoing(&self, v: VertexId) -> Option<HalfEdgeId> {
-        let h = self.outgoing[v.index()];
+        let h = self.links.outgoing[v.index()];
         (h != NONE).then_some(HalfEdgeId(h))
     }
 
@@ -464,15 +486,15 @@ impl PolyMesh {
     /// The boundary loops, each as its half-edges in order (the surface on their right).
     #[must_use]
     pub fn boundary_loops(&self) -> Vec<Vec<HalfEdgeId>> {
-        let first_boundary = self.face_start[self.face_count()];
-        let mut seen = vec![false; self.origin.len() - first_boundary as usize];
+        let first_boundary = self.links.face_start[self.face_count()];
+        let mut seen = vec![false; self.links.origin.len() - first_boundary as usize];
         let mut loops = Vec::new();
-        for start in first_boundary..self.origin.len() as u32 {
+        for start in first_boundary..self.links.origin.len() as u32 {
             let mut walk = Vec::new();
             let mut at = start;
             while !std::mem::replace(&mut seen[(at - first_boundary) as usize], true) {
                 walk.push(HalfEdgeId(at));
-                at = self.next[at as usize];
+                at = self.links.next[at as usize];
             }
             if !walk.is_empty() {
                 loops.push(walk);

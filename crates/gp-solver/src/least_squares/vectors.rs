@@ -83,7 +83,8 @@ impl VectorPlan {
 
     /// The off-diagonal entries of `D`.
     fn couplings(&self) -> impl Iterator<Item = (usize, usize, f64)> {
-        let entries = self.products.iter().zip(&self.shares).map(|(product, share)| share * product);
+        let entries =
+            self.products.iter().zip(&self.shares).map(|(product, share)| share * product);
         entries.zip(&self.pairs).map(|(entry, &[a, b, _])| (a as usize, b as usize, entry))
     }
 
