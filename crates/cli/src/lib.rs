@@ -11,17 +11,22 @@ mod context;
 mod failure;
 mod net_files;
 mod net_report;
+mod limits;
 mod option_flags;
 mod outcome;
 mod panel_files;
+mod paths;
 mod report_support;
+mod stdout;
 mod surface_file;
 mod watch;
+mod written;
 
-use clap::{CommandFactory, Parser};
+use clap::{CommandFactory, FromArgMatches, Parser};
 use context::Context;
 use failure::{DEFECT, Failure, INTERRUPTED, NOT_CONVERGED, OK, USAGE};
 use outcome::{Outcome, Status};
+use paths::Paths;
 use std::io::Write;
 use std::process::ExitCode;
 use std::time::Instant;
@@ -56,16 +61,31 @@ pub fn main() -> ExitCode {
 }
 
 fn start() -> u8 {
-    let cli = match Cli::try_parse() {
-        Ok(cli) => cli,
+    let parsed = Cli::command().try_get_matches().and_then(|matches| {
+        Ok((Paths::of(&Cli::command(), &matches), Cli::from_arg_matches(&matches)?))
+    });
+    let (paths, cli) = match parsed {
+        Ok(parsed) => parsed,
         Err(error) => {
             // `--help` and `--version` come here too; clap prints them to stdout.
-            let _ = error.print();
-            return if error.use_stderr() { USAGE } else { OK };
+            let printed = error.print();
+            if error.use_stderr() {
+                return USAGE;
+            }
+            return match stdout::judged(printed) {
+                Ok(()) => OK,
+                Err(failure) => {
+                    say(&failure.to_string());
+                    failure.code()
+                }
+            };
         }
     };
-    let result =
-        Context::new(&cli.global).and_then(|context| run(&cli.global, &context, cli.command));
+    let result = paths
+        .check()
+        .and_then(|()| limits::heed_file_size())
+        .and_then(|()| Context::new(&cli.global))
+        .and_then(|context| run(&cli.global, &paths, &context, cli.command));
     result.unwrap_or_else(|failure| {
         say(&failure.to_string());
         failure.code()
@@ -74,6 +94,7 @@ fn start() -> u8 {
 
 fn run(
     global: &args::GlobalArgs,
+    paths: &Paths,
     context: &Context,
     command: commands::Command,
 ) -> Result<u8, Failure> {
@@ -83,6 +104,7 @@ fn run(
     }
     let name = command.name();
     let outcome = command.run(context)?;
+    paths.check_results(&outcome)?;
     for warning in &outcome.warnings {
         say(&format!("warning: {warning}"));
     }
@@ -90,12 +112,15 @@ fn run(
         (path.clone(), outcome.metrics_file(name, begin.elapsed().as_secs_f64(), context.threads))
     });
     context.begin_writing();
+    paths.make_folders(&outcome)?;
     outcome.write_files(metrics)?;
     if !global.quiet {
-        let mut out = std::io::stdout().lock();
-        for line in &outcome.summary {
-            // A closed pipe (`umbilic … | head`) is the reader's choice, not an error.
-            let _ = writeln!(out, "{line}");
+        let summary: String = outcome.summary.iter().map(|line| format!("{line}\n")).collect();
+        if paths.use_stdout() {
+            // Standard output holds a result; people read the rest beside it.
+            let _ = std::io::stderr().lock().write_all(summary.as_bytes());
+        } else {
+            stdout::write(summary.as_bytes())?;
         }
     }
     Ok(exit_code(&outcome))
@@ -103,6 +128,7 @@ fn run(
 
 fn exit_code(outcome: &Outcome) -> u8 {
     match outcome.status {
+        _ if outcome.differs => DEFECT,
         Status::Interrupted => INTERRUPTED,
         Status::Converged => OK,
         _ if outcome.require_converged => NOT_CONVERGED,

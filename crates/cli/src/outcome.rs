@@ -1,6 +1,8 @@
 //! What a command hands back: files still in memory, numbers, and a summary.
 
 use crate::failure::Failure;
+use crate::paths::{STDOUT, twice};
+use crate::stdout;
 use serde::Serialize;
 use std::path::{Path, PathBuf};
 
@@ -27,6 +29,8 @@ pub(crate) struct Outcome {
     pub(crate) warnings: Vec<String>,
     /// Whether another status than `converged` exits with code 3.
     pub(crate) require_converged: bool,
+    /// Whether a file is not what a run says of it, which exits with code 1.
+    pub(crate) differs: bool,
 }
 
 impl Outcome {
@@ -42,6 +46,7 @@ impl Outcome {
             summary: Vec::new(),
             warnings: Vec::new(),
             require_converged: false,
+            differs: false,
         }
     }
 
@@ -76,36 +81,27 @@ impl Outcome {
         bytes
     }
 
-    /// Writes all files, or none of them.
+    /// Writes all files, or none of them; then what goes to standard output.
     pub(crate) fn write_files(&self, metrics: Option<(PathBuf, Vec<u8>)>) -> Result<(), Failure> {
-        let files: Vec<(&Path, &[u8])> = self
+        let (streams, files): (Vec<_>, Vec<_>) = self
             .written()
             .chain(metrics.as_ref())
             .map(|(path, bytes)| (path.as_path(), bytes.as_slice()))
-            .collect();
+            .partition(|(path, _)| *path == Path::new(STDOUT));
         for (k, (path, _)) in files.iter().enumerate() {
-            if files[..k].iter().any(|(other, _)| is_same_file(path, other)) {
-                let message = "two results would be written to this file; name another for one";
-                return Err(Failure::usage(format!("{}: {message}", path.display())));
+            let same = |(other, _): &&(&Path, &[u8])| exchange::is_same_file(path, other);
+            if let Some((other, _)) = files[..k].iter().find(same) {
+                return Err(twice(path, other));
             }
         }
-        exchange::write_files(&files).map_err(Failure::usage)
+        exchange::write_files(&files).map_err(Failure::usage)?;
+        streams.iter().try_for_each(|(_, bytes)| stdout::write(bytes))
     }
 
     fn written(&self) -> impl Iterator<Item = &(PathBuf, Vec<u8>)> {
         let results = if self.status == Status::Interrupted { &[][..] } else { &self.files };
         results.iter().chain(&self.checkpoint)
     }
-}
-
-/// Whether both names lead to one file, which need not exist yet.
-fn is_same_file(a: &Path, b: &Path) -> bool {
-    let place = |path: &Path| {
-        let folder = path.parent().filter(|f| !f.as_os_str().is_empty());
-        let folder = folder.unwrap_or(Path::new(".")).canonicalize().ok();
-        folder.map(|folder| (folder, path.file_name().map(ToOwned::to_owned)))
-    };
-    a.file_name() == b.file_name() && (a == b || place(a).is_some() && place(a) == place(b))
 }
 
 #[derive(Serialize)]

@@ -16,6 +16,7 @@ use crate::options::Options;
 use crate::prepare::prepared;
 use crate::sampled::SampledSurface;
 use crate::schedule::Schedule;
+use crate::target::Target;
 use crate::variables::{coordinates, scaled};
 
 /// The name of the method in checkpoints.
@@ -37,6 +38,11 @@ pub struct Solution {
     pub report: RunReport,
     /// Samples in u and v of the last level.
     pub samples: [usize; 2],
+    /// Working lengths per length of the model: the scale [`Metrics::relation_rms`] is measured on.
+    pub working_scale: f64,
+    /// Standard deviations of `H` and `K` at the start, on the working scale, if there is a
+    /// relation: distances from fitted lines and curves are in units of them.
+    pub relation_scale: Option<[f64; 2]>,
 }
 
 /// Optimises `surface` towards a Weingarten surface near to it.
@@ -170,6 +176,8 @@ fn finish(
         report,
         result,
         samples,
+        working_scale: level.stage.unit,
+        relation_scale: target.as_ref().map(Target::deviation),
     })
 }
 

@@ -19,7 +19,7 @@ use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 /// The built-in input.
-const ROOF: &str = include_str!("../../../../fixtures/roof.ron");
+pub(super) const ROOF: &str = include_str!("../../../../fixtures/roof.ron");
 /// Control nets the roof is optimised at, one after the other.
 const LEVELS: [(usize, usize); 4] = [(10, 8), (14, 10), (18, 14), (25, 18)];
 /// Panels in u and v.
@@ -68,7 +68,7 @@ impl Demo {
         let solution =
             weingarten::solve(&named.surface, &options, &mut watch).map_err(Failure::other)?;
         drop(watch);
-        let mut outcome = outcome(&solution, &model.unit)?;
+        let mut outcome = outcome(&solution, &options, &model.unit)?;
         if outcome.status == Status::Interrupted {
             return Ok(outcome);
         }

@@ -8,7 +8,7 @@ use crate::outcome::Outcome;
 use crate::report_support;
 use crate::watch::Watch;
 use curvature_variation::{
-    Constraints, Functional, Input, Options, Solution, SplinePatches, SurfaceSamples, solve,
+    Constraints, Error, Functional, Input, Options, Solution, SplinePatches, SurfaceSamples, solve,
     spline_patches,
 };
 use exchange::{Field, LengthUnit, Mesh, Model, NamedSurface};
@@ -65,6 +65,7 @@ impl Fair {
         self.output.check()?;
         self.report.check()?;
         let options = self.options.options(&self.config)?;
+        options.check().map_err(|e| self.options.refused(&self.config, e))?;
         let files = &self.files;
         let held = files.fix.is_some() || files.creases.is_some() || options.clamp_boundary;
         if held && !files.family.is_empty() {
@@ -77,7 +78,7 @@ impl Fair {
         let input = self.read(&model)?;
         let mut watch = Watch::new(context, "fairing").with_checkpoints(&self.checkpoint)?;
         let mut result =
-            solve(&input, &options, &mut watch).map_err(|e| refused::<Options>(&self.input, e))?;
+            solve(&input, &options, &mut watch).map_err(|e| self.refused(&e))?;
         result.metrics.peak_memory_mb = peak_memory_mb();
         let splines = match self.output.output.iter().find(|path| is_spline_file(path)) {
             Some(path) => Some(
@@ -117,14 +118,29 @@ impl Fair {
 }
 
 impl Fair {
+    /// What the library says, of the file it speaks of.
+    fn refused(&self, error: &Error) -> Failure {
+        let constraints = self.files.fix.as_ref();
+        let file = match error {
+            Error::NoSuchVertex { .. } | Error::Weight { .. } | Error::NothingFree { .. } => {
+                constraints
+            }
+            // Counted from 1.
+            Error::OtherFaces { member } => self.files.family.get(member - 1),
+            _ => None,
+        };
+        refused::<Options>(file.unwrap_or(&self.input), error)
+    }
+
     /// The mesh and what the files say of it.
     fn read(&self, model: &Model) -> Result<Input, Failure> {
         let mesh = read_control_mesh(&self.input, model)?;
         let creases = match &self.files.creases {
             None => Creases::none(),
             Some(path) => {
+                // An edge of sharpness `inf` stays sharp for ever.
                 let list: CreaseList =
-                    exchange::read_ron(path).map_err(|e| Failure::input(path, e))?;
+                    exchange::read_ron_with_infinity(path).map_err(|e| Failure::input(path, e))?;
                 list.for_mesh(&mesh).map_err(|e| Failure::input(path, e))?
             }
         };

@@ -45,8 +45,8 @@ impl Hnet {
         self.report.check()?;
         net_files::check_outputs(&self.output.output, &net_files::NET_OUTPUTS)?;
         let options = self.options.options(&self.config)?;
+        options.check().map_err(|e| self.options.refused(&self.config, e))?;
         let refused = |e: hyperbolic_nets::Error| option_flags::refused::<Options>(&self.input, e);
-        options.check().map_err(refused)?;
         let (input, unit, mut warnings) = net_files::read(&self.input)?;
         let net = match input {
             NetInput::Net(surface) => surface.net().clone(),

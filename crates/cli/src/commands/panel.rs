@@ -75,6 +75,7 @@ impl Panel {
         self.check_outputs()?;
         self.report.check()?;
         let options = self.options.options(&self.config)?;
+        options.check().map_err(|e| self.options.refused(&self.config, e))?;
         let (model, named) = read_surface(&self.surface)?;
         let unit = model.unit;
         let layout = layout(self.options.file("layout"), &options, &named.surface)?;

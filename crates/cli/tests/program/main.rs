@@ -10,9 +10,11 @@ mod dist;
 mod dist_example;
 mod every_command;
 mod fair;
+mod files;
 mod hyperbolic;
 #[cfg(unix)]
 mod interruptions;
 mod panel;
 mod report;
+mod verify;
 mod weingarten;

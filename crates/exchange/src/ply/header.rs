@@ -102,7 +102,10 @@ pub(super) fn read_header(bytes: &[u8]) -> Result<Header, ReadError> {
             Err(ReadError::text(number, format!("{what} `{}`", clip(&line)), mend))
         };
         match words[..] {
-            ["format", format, _] => {
+            ["format", format, version] => {
+                if version != "1.0" {
+                    return fault("unknown version in", "write `format NAME 1.0`");
+                }
                 has_format = true;
                 header.encoding = match format {
                     "ascii" => Encoding::Ascii,
@@ -115,6 +118,9 @@ pub(super) fn read_header(bytes: &[u8]) -> Result<Header, ReadError> {
                 let Ok(count) = count.parse() else {
                     return fault("no count in", "write `element NAME COUNT`");
                 };
+                if header.elements.iter().any(|e| e.name == name) {
+                    return fault("declared before:", "give every kind of element once");
+                }
                 let element = Element { name: name.into(), count, properties: Vec::new() };
                 header.elements.push(element);
             }

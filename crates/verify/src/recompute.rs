@@ -1,0 +1,97 @@
+//! One file of a run against its metrics.
+
+use crate::claims::{Claims, Finding, Values};
+use crate::content::Content;
+use crate::table::row_of;
+use crate::{analyze, asymptotic, convert, darboux, fair, fit, hnet, panel, weingarten};
+use serde_json::Value;
+
+/// Every number of `metrics` compared with what `file`, written by `command`, gives; `input` is
+/// what the run was given, if that is known.
+#[must_use]
+pub fn check(
+    command: &str,
+    metrics: &Value,
+    file: &Content,
+    input: Option<&Content>,
+) -> Vec<Finding> {
+    let claims = Claims::new(metrics);
+    let values = recompute(command, &claims, file, input);
+    // The scale of lengths: the larger of the two, since deviations are of the input's size.
+    let size = file.size().max(input.map_or(0.0, Content::size));
+    let is_single = file.is_single || (command == "convert" && input.is_some_and(|i| i.is_single));
+    let numbers = claims.numbers().into_iter();
+    numbers
+        .map(|claim| {
+            let row = row_of(command, &claim.0);
+            Finding::new(claim, row, &values, (size, is_single))
+        })
+        .collect()
+}
+
+fn recompute(
+    command: &str,
+    claims: &Claims<'_>,
+    file: &Content,
+    input: Option<&Content>,
+) -> Values {
+    let mut values = Values::default();
+    let input_surface = input.and_then(|i| one(&i.surfaces));
+    match command {
+        "weingarten" => {
+            if let Some(surface) = one(&file.surfaces) {
+                weingarten::recompute(surface, input_surface, claims, &mut values);
+            }
+        }
+        "demo" => {
+            if let Some(surface) = one(&file.surfaces) {
+                // The molds are surfaces as well, without the samples of the roof.
+                let is_net = claims.count("control_points")
+                    == Some(surface.different_counts().iter().product());
+                if is_net {
+                    weingarten::recompute(surface, input_surface, claims, &mut values);
+                }
+            }
+            values.below("panels_after");
+            // Of the surfaces one is the roof, several are molds; only these go on.
+            let molds = if file.surfaces.len() > 1 { file.surfaces.clone() } else { Vec::new() };
+            panel::recompute(&Content { surfaces: molds, ..file.clone() }, None, &mut values);
+        }
+        "panel" => panel::recompute(file, input_surface, &mut values),
+        "hnet" => hnet::recompute(file, &mut values),
+        "darboux" => {
+            if let (Some(mesh), Some(faces)) = (file.mesh(), claims.count("faces")) {
+                darboux::recompute(mesh, faces, &mut values);
+            }
+        }
+        "asymptotic" => asymptotic::recompute(&file.surfaces, file.size(), &mut values),
+        "fair" => {
+            if let Some(mesh) = file.mesh() {
+                fair::recompute(mesh, claims, &mut values);
+            }
+        }
+        "fit" => {
+            if let Some(surface) = one(&file.surfaces) {
+                fit::recompute(surface, input, &mut values);
+            }
+        }
+        "analyze" => {
+            let is_regular = claims.count("singular_points") == Some(0);
+            if !file.surfaces.is_empty() && is_regular {
+                analyze::recompute(&file.surfaces, &mut values);
+            }
+        }
+        "convert" => {
+            let had_surfaces = claims.count("surfaces").is_some_and(|n| n > 0);
+            if had_surfaces != file.surfaces.is_empty() {
+                convert::recompute(file, &mut values);
+            }
+        }
+        _ => {}
+    }
+    values
+}
+
+fn one<T>(list: &[T]) -> Option<&T> {
+    if let [only] = list { Some(only) } else { None }
+}
