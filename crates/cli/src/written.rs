@@ -96,8 +96,7 @@ fn of_surface(surface: &BsplineSurface) -> Result<Spline, verify::SplineError> {
     };
     let all = 0..count(u) * count(v);
     let points: Vec<DVec3> = all.clone().map(|k| surface.control_points()[place(k)]).collect();
-    let weights: Option<Vec<f64>> =
-        surface.weights().map(|w| all.map(|k| w[place(k)]).collect());
+    let weights: Option<Vec<f64>> = surface.weights().map(|w| all.map(|k| w[place(k)]).collect());
     let degrees = [u.degree().get(), v.degree().get()];
     let knots = [u.knots().to_vec(), v.knots().to_vec()];
     let closed = [u.is_periodic(), v.is_periodic()];

@@ -1,8 +1,8 @@
 //! Reading whole files, and writing them so that a reader never sees half of one.
 
 use crate::error::{ReadError, WriteError};
-use std::ffi::OsString;
 use crate::replaced::{check_unprotected, keep, temporary};
+use std::ffi::OsString;
 use std::fs::{self, File};
 use std::io::Write;
 use std::path::{Path, PathBuf};

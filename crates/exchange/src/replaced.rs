@@ -52,8 +52,8 @@ pub(crate) fn keep(file: &File, old: &Metadata) -> Result<(), WriteError> {
 
 #[cfg(all(test, unix))]
 mod tests {
-    use crate::files::{check_writable, write_files};
     use crate::error::WriteError;
+    use crate::files::{check_writable, write_files};
     use std::fs;
     use std::os::unix::fs::{MetadataExt, PermissionsExt};
 

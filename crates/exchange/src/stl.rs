@@ -27,9 +27,8 @@ pub fn read_stl(bytes: &[u8]) -> Result<(Mesh, Vec<String>), ReadError> {
             let end = HEADER + 4 + n * TRIANGLE;
             soup.read_binary(&bytes[..end])?;
             let rest = bytes.len() - end;
-            soup.warnings.push(format!(
-                "byte {end}: the {rest} bytes after the last triangle are left out"
-            ));
+            soup.warnings
+                .push(format!("byte {end}: the {rest} bytes after the last triangle are left out"));
         }
         Some(n) => {
             let fits = (bytes.len() - HEADER - 4) / TRIANGLE;

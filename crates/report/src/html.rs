@@ -148,9 +148,7 @@ fn script() -> String {
     }
     let shaders = escape_script(&Value::Object(shaders));
     let parts = SCRIPTS.join("\n");
-    format!(
-        "\n\"use strict\";\n(() => {{\nconst SHADERS = {shaders};\n{parts}\n{MAIN}}})();\n"
-    )
+    format!("\n\"use strict\";\n(() => {{\nconst SHADERS = {shaders};\n{parts}\n{MAIN}}})();\n")
 }
 
 fn card(class: &str, title: &str, content: &str) -> String {

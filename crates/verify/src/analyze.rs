@@ -38,8 +38,7 @@ pub(crate) fn recompute(surfaces: &[Spline], values: &mut Values) {
             if let Some(weight) = weight {
                 let weight = weight * shape.delta.sqrt();
                 area += weight;
-                let sizes =
-                    [shape.mean.abs(), shape.gaussian.abs(), 0.5 * (k1.abs() + k2.abs())];
+                let sizes = [shape.mean.abs(), shape.gaussian.abs(), 0.5 * (k1.abs() + k2.abs())];
                 sums.iter_mut().zip(sizes).for_each(|(sum, size)| *sum += weight * size);
             }
         }

@@ -53,9 +53,9 @@ fn measure(patch: &Spline) -> Measured {
         Measured { thin_plate: 0.0, normal_curvature: 0.0, sine: f64::INFINITY, positive: 0.0 };
     let rule = gauss(patch.degree()[0] + 1);
     let nodes: Vec<f64> = rule.iter().map(|(x, _)| *x).collect();
-    for (i, (u, w)) in rule.iter().enumerate() {
-        let _ = i;
-        patch.row(*u, &nodes, 2, |j, jet| {
+    let (us, vs) = (patch.ready(0, &nodes, 2), patch.ready(1, &nodes, 2));
+    for (u, (_, w)) in us.iter().zip(&rule) {
+        patch.row(u, &vs, |j, jet| {
             let d = &jet.d;
             let density = d[2][0].length_squared()
                 + 2.0 * d[1][1].length_squared()
@@ -83,8 +83,9 @@ fn measure(patch: &Spline) -> Measured {
     out.normal_curvature = worst;
     let t = patch.equidistant(0, GRID);
     let mut curvatures = Vec::with_capacity(GRID * GRID);
-    for u in &t {
-        patch.row(*u, &t, 2, |_, jet| {
+    let (us, vs) = (patch.ready(0, &t, 2), patch.ready(1, &t, 2));
+    for u in &us {
+        patch.row(u, &vs, |_, jet| {
             let shape = Shape::new(jet);
             let sine = (shape.delta / (shape.e * shape.g)).sqrt();
             out.sine = if sine.is_nan() { f64::NAN } else { out.sine.min(sine) };
@@ -130,11 +131,9 @@ fn sides(patches: &[Spline], reach: f64, values: &mut Values) {
         };
         let key = |p: DVec3| (p / (8.0 * reach)).to_array().map(|x| x.floor() as i64);
         let [x, y, z] = key(m);
-        let around = (-1..=1).flat_map(|i| {
-            (-1..=1).flat_map(move |j| (-1..=1).map(move |k| [x + i, y + j, z + k]))
-        });
-        let found =
-            around.filter_map(|cell| by_middle.get(&cell)).flatten().copied().find(same);
+        let around = (-1..=1)
+            .flat_map(|i| (-1..=1).flat_map(move |j| (-1..=1).map(move |k| [x + i, y + j, z + k])));
+        let found = around.filter_map(|cell| by_middle.get(&cell)).flatten().copied().find(same);
         match found {
             Some(curve) => curves[curve].push(side),
             None => {

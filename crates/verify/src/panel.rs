@@ -208,9 +208,9 @@ fn seams(panels: &[Panel], reach: f64) -> Vec<[Side; 2]> {
         let reach = reach * length(*side);
         let [x, y, z] = key(at(*side, STEPS / 2));
         let mut best: Option<(f64, usize)> = None;
-        for cell in (-1..=1).flat_map(|i| {
-            (-1..=1).flat_map(move |j| (-1..=1).map(move |k| [x + i, y + j, z + k]))
-        }) {
+        for cell in (-1..=1)
+            .flat_map(|i| (-1..=1).flat_map(move |j| (-1..=1).map(move |k| [x + i, y + j, z + k])))
+        {
             for &other in cells.get(&cell).into_iter().flatten() {
                 let far = apart(*side, sides[other]);
                 if other != index && far < reach && best.is_none_or(|(least, _)| far < least) {
@@ -218,7 +218,9 @@ fn seams(panels: &[Panel], reach: f64) -> Vec<[Side; 2]> {
                 }
             }
         }
-        out.extend(best.filter(|(_, other)| *other > index).map(|(_, other)| [*side, sides[other]]));
+        out.extend(
+            best.filter(|(_, other)| *other > index).map(|(_, other)| [*side, sides[other]]),
+        );
     }
     out
 }

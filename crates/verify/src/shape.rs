@@ -76,22 +76,17 @@ impl Shape {
         let along = |by: usize| {
             // Derivatives of S_u, S_v and of the second derivatives by u or by v.
             let (su_t, sv_t) = if by == 0 { (d[2][0], d[1][1]) } else { (d[1][1], d[0][2]) };
-            let third = if by == 0 {
-                [d[3][0], d[2][1], d[1][2]]
-            } else {
-                [d[2][1], d[1][2], d[0][3]]
-            };
+            let third =
+                if by == 0 { [d[3][0], d[2][1], d[1][2]] } else { [d[2][1], d[1][2], d[0][3]] };
             let cross_t = su_t.cross(sv) + su.cross(sv_t);
             let seconds = [d[2][0], d[1][1], d[0][2]];
-            let [l_t, m_t, n_t] =
-                [0, 1, 2].map(|k| third[k].dot(cross) + seconds[k].dot(cross_t));
+            let [l_t, m_t, n_t] = [0, 1, 2].map(|k| third[k].dot(cross) + seconds[k].dot(cross_t));
             let (e_t, f_t, g_t) =
                 (2.0 * su.dot(su_t), su_t.dot(sv) + su.dot(sv_t), 2.0 * sv.dot(sv_t));
             let delta_t = 2.0 * cross.dot(cross_t);
             let top = l * g - 2.0 * m * f + n * e;
             let top_t = l_t * g + l * g_t - 2.0 * (m_t * f + m * f_t) + n_t * e + n * e_t;
-            let mean =
-                (top_t - 1.5 * top * delta_t / self.delta) / (2.0 * self.delta.powf(1.5));
+            let mean = (top_t - 1.5 * top * delta_t / self.delta) / (2.0 * self.delta.powf(1.5));
             let bottom = self.delta * self.delta;
             let gaussian = (l_t * n + l * n_t - 2.0 * m * m_t) / bottom
                 - 2.0 * (l * n - m * m) * delta_t / (bottom * self.delta);
@@ -244,7 +239,8 @@ mod tests {
         // |∇H|² from the trace of C agrees with the slopes of H.
         let slopes = shape.slopes(&jet);
         let [hu, hv] = slopes.mean;
-        let squared = (shape.g * hu * hu - 2.0 * shape.f * hu * hv + shape.e * hv * hv) / shape.delta;
+        let squared =
+            (shape.g * hu * hu - 2.0 * shape.f * hu * hv + shape.e * hv * hv) / shape.delta;
         let trace = 0.25 * ((a + c).powi(2) + (b + d).powi(2));
         assert!((squared - trace).abs() < 1e-13 * trace, "{squared} {trace}");
         assert!((0.5 * (l + n) - shape.mean).abs() < 1e-14);

@@ -70,7 +70,14 @@ impl Spline {
         }
         let weight = |k: usize| weights.map_or(1.0, |w| w[k]);
         let points = points.iter().enumerate().map(|(k, p)| (*p * weight(k)).extend(weight(k)));
-        Ok(Self { degree, knots, counts, points: points.collect(), is_rational: weights.is_some(), closed: [false; 2] })
+        Ok(Self {
+            degree,
+            knots,
+            counts,
+            points: points.collect(),
+            is_rational: weights.is_some(),
+            closed: [false; 2],
+        })
     }
 
     /// A Bézier patch of one degree over the unit square.
@@ -183,7 +190,8 @@ impl Spline {
     #[must_use]
     pub fn jet(&self, u: f64, v: f64, order: usize) -> Jet {
         let mut jet = Jet::default();
-        self.row(u, &[v], order, |_, found| jet = *found);
+        let (u, v) = (self.ready(0, &[u], order), self.ready(1, &[v], order));
+        self.row(&u[0], &v, |_, found| jet = *found);
         jet
     }
 
@@ -212,45 +220,53 @@ impl Spline {
     /// If `order` is above [`ORDER`].
     #[must_use]
     pub fn jets(&self, u: &[f64], v: &[f64], order: usize) -> Vec<Jet> {
+        let (u, v) = (self.ready(0, u, order), self.ready(1, v, order));
         let rows: Vec<Vec<Jet>> = u
             .par_iter()
             .map(|u| {
                 let mut row = Vec::with_capacity(v.len());
-                self.row(*u, v, order, |_, jet| row.push(*jet));
+                self.row(u, &v, |_, jet| row.push(*jet));
                 row
             })
             .collect();
         rows.concat()
     }
 
-    /// Jets along `u = const`: the net is first reduced to curves in v, one per derivative by u.
+    /// Makes parameters of a direction ready for jets up to `order`.
     ///
     /// # Panics
     /// If `order` is above [`ORDER`].
-    pub fn row(&self, u: f64, v: &[f64], order: usize, mut each: impl FnMut(usize, &Jet)) {
+    #[must_use]
+    pub fn ready(&self, direction: usize, parameters: &[f64], order: usize) -> Vec<Ready> {
         assert!(order <= ORDER, "derivatives go to order {ORDER}");
-        let [n_u, n_v] = self.counts;
+        let (knots, degree) = (&self.knots[direction], self.degree[direction]);
+        let count = self.counts[direction];
+        parameters.iter().map(|t| Ready::new(knots, degree, count, *t, order)).collect()
+    }
+
+    /// Jets along `u = const`: the net is first reduced to curves in v, one per derivative by u.
+    pub fn row(&self, u: &Ready, v: &[Ready], mut each: impl FnMut(usize, &Jet)) {
+        let n_v = self.counts[1];
         let [p, q] = self.degree;
-        let span = span(&self.knots[0], p, n_u, u);
-        let mut local = vec![DVec4::ZERO; p + 1];
+        let order = u.order;
+        let mut local = vec![DVec4::ZERO; p.max(q) + 1];
+        let mut work = local.clone();
         let mut reduced = vec![DVec4::ZERO; (order + 1) * n_v];
         for j in 0..n_v {
-            for (i, slot) in local.iter_mut().enumerate() {
-                *slot = self.points[(span - p + i) * n_v + j];
+            for (i, slot) in local.iter_mut().enumerate().take(p + 1) {
+                *slot = self.points[(u.span - p + i) * n_v + j];
             }
-            let found = curve_derivatives(&self.knots[0], p, span, &mut local, u, order);
+            let found = u.derivatives(&mut local[..=p], &mut work, order);
             for (i, value) in found.iter().enumerate().take(order + 1) {
                 reduced[i * n_v + j] = *value;
             }
         }
-        let mut local = vec![DVec4::ZERO; q + 1];
         for (index, v) in v.iter().enumerate() {
-            let span = self::span(&self.knots[1], q, n_v, *v);
             let mut all = [[DVec4::ZERO; ORDER + 1]; ORDER + 1];
             for (i, row) in all.iter_mut().enumerate().take(order + 1) {
-                let from = i * n_v + span - q;
-                local.copy_from_slice(&reduced[from..=from + q]);
-                *row = curve_derivatives(&self.knots[1], q, span, &mut local, *v, order - i);
+                let from = i * n_v + v.span - q;
+                local[..=q].copy_from_slice(&reduced[from..=from + q]);
+                *row = v.derivatives(&mut local[..=q], &mut work, order - i);
             }
             each(index, &self.projected(&all, order));
         }
@@ -283,9 +299,8 @@ impl Spline {
     /// squared distance from the nearest points of a grid, within the domain.
     #[must_use]
     pub fn nearest(&self, grid: &NearestGrid, point: DVec3) -> ([f64; 2], f64) {
-        let mut starts: Vec<(f64, usize)> = (0..grid.points.len())
-            .map(|k| (grid.points[k].distance_squared(point), k))
-            .collect();
+        let mut starts: Vec<(f64, usize)> =
+            (0..grid.points.len()).map(|k| (grid.points[k].distance_squared(point), k)).collect();
         let count = STARTS.min(starts.len());
         starts.select_nth_unstable_by(count - 1, |a, b| a.0.total_cmp(&b.0));
         let mut best = ([f64::NAN; 2], f64::INFINITY);
@@ -303,6 +318,7 @@ impl Spline {
         let (du, dv) = (self.domain(0), self.domain(1));
         let mut jet = self.jet(u, v, 2);
         let mut distance = jet.d[0][0].distance(point);
+        let mut last = f64::INFINITY;
         for _ in 0..60 {
             let gap = jet.d[0][0] - point;
             let (su, sv) = (jet.d[1][0], jet.d[0][1]);
@@ -326,6 +342,14 @@ impl Spline {
                     (-(g * a - f * b) / det, -(e * b - f * a) / det)
                 }
             };
+            let length = (step_u / (du[1] - du[0])).hypot(step_v / (dv[1] - dv[0]));
+            // Near the foot a step changes the distance by less than its rounding; there steps go on
+            // as long as they become shorter.
+            let slack = if length < 1e-4 { 1e-14 * distance } else { 0.0 };
+            if length < 1e-15 || (slack > 0.0 && length > 0.5 * last) {
+                break;
+            }
+            last = length;
             let mut share = 1.0;
             let better = loop {
                 let next = [
@@ -334,7 +358,7 @@ impl Spline {
                 ];
                 let there = self.jet(next[0], next[1], 2);
                 let far = there.d[0][0].distance(point);
-                if far < distance {
+                if far < distance + slack {
                     break Some((next, there, far));
                 }
                 share *= 0.5;
@@ -343,11 +367,7 @@ impl Spline {
                 }
             };
             let Some((next, there, far)) = better else { break };
-            let gained = distance - far;
             ([u, v], jet, distance) = (next, there, far);
-            if gained <= 1e-15 * distance {
-                break;
-            }
         }
         ([u, v], distance)
     }
@@ -398,36 +418,62 @@ fn span(knots: &[f64], degree: usize, count: usize, t: f64) -> usize {
     k
 }
 
-/// Derivatives 0 to `order` of the curve piece on span `k` with the `degree + 1` points `points`,
-/// which are overwritten by those of its derivatives.
-fn curve_derivatives(
-    knots: &[f64],
+/// A parameter with what de Boor's algorithm takes from the knots around it, the same for all
+/// points.
+#[derive(Clone, Debug)]
+pub struct Ready {
+    span: usize,
     degree: usize,
-    k: usize,
-    points: &mut [DVec4],
-    t: f64,
     order: usize,
-) -> [DVec4; ORDER + 1] {
-    let mut out = [DVec4::ZERO; ORDER + 1];
-    let mut work = [DVec4::ZERO; 32];
-    for (r, slot) in out.iter_mut().enumerate().take(order.min(degree) + 1) {
-        // Points `0..=p` of the derivative of order `r`, a piece of degree `p`.
-        let p = degree - r;
-        work[..=p].copy_from_slice(&points[..=p]);
-        for level in 1..=p {
-            for i in (level..=p).rev() {
-                let (low, high) = (knots[k - p + i], knots[k + 1 + i - level]);
-                let share = (t - low) / (high - low);
-                work[i] = work[i - 1] + share * (work[i] - work[i - 1]);
+    /// For each derivative the shares of the triangle, level by level, then the factors that make
+    /// points of the next derivative.
+    numbers: Vec<f64>,
+}
+
+impl Ready {
+    fn new(knots: &[f64], degree: usize, count: usize, t: f64, order: usize) -> Self {
+        let k = span(knots, degree, count, t);
+        let mut numbers = Vec::new();
+        for r in 0..=order.min(degree) {
+            let p = degree - r;
+            for level in 1..=p {
+                for i in (level..=p).rev() {
+                    let (low, high) = (knots[k - p + i], knots[k + 1 + i - level]);
+                    numbers.push((t - low) / (high - low));
+                }
+            }
+            numbers.extend((0..p).map(|i| p as f64 / (knots[k + 1 + i] - knots[k - p + 1 + i])));
+        }
+        Self { span: k, degree, order, numbers }
+    }
+
+    /// Derivatives 0 to `order` of the curve piece with these `degree + 1` points, which are
+    /// overwritten by those of its derivatives.
+    fn derivatives(
+        &self,
+        points: &mut [DVec4],
+        work: &mut [DVec4],
+        order: usize,
+    ) -> [DVec4; ORDER + 1] {
+        let mut out = [DVec4::ZERO; ORDER + 1];
+        let mut numbers = self.numbers.iter();
+        let mut next = || numbers.next().copied().unwrap_or(f64::NAN);
+        for (r, slot) in out.iter_mut().enumerate().take(order.min(self.degree) + 1) {
+            // Points `0..=p` of the derivative of order `r`, a piece of degree `p`.
+            let p = self.degree - r;
+            work[..=p].copy_from_slice(&points[..=p]);
+            for level in 1..=p {
+                for i in (level..=p).rev() {
+                    work[i] = work[i - 1] + next() * (work[i] - work[i - 1]);
+                }
+            }
+            *slot = work[p];
+            for i in 0..p {
+                points[i] = (points[i + 1] - points[i]) * next();
             }
         }
-        *slot = work[p];
-        for i in 0..p {
-            let (low, high) = (knots[k - p + 1 + i], knots[k + 1 + i]);
-            points[i] = (points[i + 1] - points[i]) * (p as f64 / (high - low));
-        }
+        out
     }
-    out
 }
 
 #[cfg(test)]

@@ -35,9 +35,10 @@ pub(crate) fn recompute(
         })
         .collect();
     let range = |f: fn(&Shape) -> f64| {
-        samples.iter().map(|(s, _)| f(s)).fold([f64::INFINITY, f64::NEG_INFINITY], |[a, b], x| {
-            [a.min(x), b.max(x)]
-        })
+        samples
+            .iter()
+            .map(|(s, _)| f(s))
+            .fold([f64::INFINITY, f64::NEG_INFINITY], |[a, b], x| [a.min(x), b.max(x)])
     };
     let (h, k) = (range(|s| s.mean), range(|s| s.gaussian));
     values.number("mean_curvature_min", h[0]);
@@ -68,8 +69,7 @@ fn alignment(
     k: [f64; 2],
 ) -> [f64; 2] {
     let largest = |s: &Shape| s.principal().iter().fold(0.0, |a: f64, p| a.max(p.abs()));
-    let curved =
-        samples.iter().map(|(s, _)| largest(s)).fold(CONSTANT_RATIO / size, f64::max);
+    let curved = samples.iter().map(|(s, _)| largest(s)).fold(CONSTANT_RATIO / size, f64::max);
     let (range_h, range_k) = (h[1] - h[0], k[1] - k[0]);
     if range_h <= CONSTANT_RATIO * curved || range_k <= CONSTANT_RATIO * curved * curved {
         return [0.0; 2];
@@ -250,7 +250,8 @@ mod tests {
         let ratio = json!({"relation": "ratio=3", "working_scale": 1.0});
         // κ of (2, 3) are 3 and 1: exact; of (4, 12) 6 and 2: exact.
         assert!(rms(ratio).unwrap() < 1e-14);
-        let fitted = json!({"relation": "linear", "working_scale": 1.0, "relation_scale": [1.0, 2.0]});
+        let fitted =
+            json!({"relation": "linear", "working_scale": 1.0, "relation_scale": [1.0, 2.0]});
         assert!(rms(fitted).unwrap() < 1e-14, "two points have a line");
         assert_eq!(rms(json!({"relation": "curve", "working_scale": 1.0})), None);
         assert_eq!(rms(json!({"relation": "cmc=1"})), None);

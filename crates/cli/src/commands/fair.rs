@@ -77,8 +77,7 @@ impl Fair {
             exchange::read_model(&self.input).map_err(|e| Failure::input(&self.input, e))?;
         let input = self.read(&model)?;
         let mut watch = Watch::new(context, "fairing").with_checkpoints(&self.checkpoint)?;
-        let mut result =
-            solve(&input, &options, &mut watch).map_err(|e| self.refused(&e))?;
+        let mut result = solve(&input, &options, &mut watch).map_err(|e| self.refused(&e))?;
         result.metrics.peak_memory_mb = peak_memory_mb();
         let splines = match self.output.output.iter().find(|path| is_spline_file(path)) {
             Some(path) => Some(

@@ -81,7 +81,8 @@ impl Verify {
     /// Where a file is that the run names: where it says, or else beside the metrics.
     fn found(&self, name: &str) -> PathBuf {
         let path = PathBuf::from(name);
-        let beside = self.run.parent().zip(path.file_name()).map(|(folder, file)| folder.join(file));
+        let beside =
+            self.run.parent().zip(path.file_name()).map(|(folder, file)| folder.join(file));
         match beside {
             Some(beside) if !path.exists() && beside.exists() => beside,
             _ => path,
@@ -162,7 +163,8 @@ fn lines(
     if !rest.is_empty() {
         lines.push("no file".to_owned());
         lines.push(heading);
-        let said = |f: &Finding| row(&f.key, &number(f.claimed), "", "", "not checkable from files");
+        let said =
+            |f: &Finding| row(&f.key, &number(f.claimed), "", "", "not checkable from files");
         lines.extend(rest.iter().map(said));
     }
     lines.push(format!(

@@ -167,7 +167,10 @@ fn a_file_that_is_not_there_and_metrics_that_are_none() {
     fs::write(run.path("metrics.json"), "{\"command\": 3}").expect("written");
     let (code, text) = run.verified(&[]);
     assert_eq!(code, 2, "{text}");
-    assert!(text.contains("metrics.json: ") && text.contains("give a file that --metrics"), "{text}");
+    assert!(
+        text.contains("metrics.json: ") && text.contains("give a file that --metrics"),
+        "{text}"
+    );
 }
 
 #[test]
