@@ -20,8 +20,18 @@ struct PanelingFile {
 /// do not.
 pub(crate) fn is_content(command: &str, path: &Path) -> bool {
     let extension = exchange::extension_of(path);
+    if extension == "json" && is_record(path) {
+        return false;
+    }
     exchange::READABLE.split(", ").any(|known| known == extension)
         || (extension == "csv" && is_panels(command))
+}
+
+/// Whether a JSON file holds the metrics or the checkpoint of a run.
+fn is_record(path: &Path) -> bool {
+    let text = exchange::read_text(path).unwrap_or_default();
+    let value = serde_json::from_str::<serde_json::Value>(&text).unwrap_or_default();
+    ["metrics", "fingerprint"].iter().any(|key| value.get(key).is_some())
 }
 
 fn is_panels(command: &str) -> bool {

@@ -3,17 +3,24 @@
 //! The written mesh has a grid of points per patch, one after the other. A line of a patch goes to
 //! a circle, so the points along every row and column lie on one; its tangents give the normals.
 
-use crate::claims::Values;
-use crate::content::Mesh;
+use crate::claims::{Claims, Values};
+use crate::content::{Mesh, centroid, diagonal};
 use crate::shape::angle_deg;
 use glam::DVec3;
 use std::collections::BTreeMap;
 
-/// Points this close, as a share of the size of a cell, are one place of two patches.
-const SAME_PLACE: f64 = 1e-3;
+/// Corners this close, as a share of the size of all, are one.
+const SAME_PLACE: f64 = 1e-8;
+/// The largest kink of an image that counts as smooth, in degrees.
+const SMOOTH: f64 = 1e-6;
 
-pub(crate) fn recompute(mesh: &Mesh, faces: usize, values: &mut Values) {
+pub(crate) fn recompute(mesh: &Mesh, claims: &Claims<'_>, values: &mut Values) {
+    let Some(faces) = claims.count("faces") else { return };
     values.count("samples", mesh.positions.len());
+    let mean = centroid(mesh.positions.iter().copied());
+    for (k, x) in mean.into_iter().flat_map(|c| c.to_array()).enumerate() {
+        values.number(&format!("centroid.{k}"), x);
+    }
     if faces == 0 || !mesh.positions.len().is_multiple_of(faces) {
         return;
     }
@@ -30,7 +37,10 @@ pub(crate) fn recompute(mesh: &Mesh, faces: usize, values: &mut Values) {
         }
     }
     values.number("circle_defect_max", defect);
-    values.number("kink_max_deg", kink_max_deg(&grids, side));
+    // The largest kink of an edge may be anywhere along it; none is anywhere along a smooth one.
+    if claims.number("kink_max_deg").is_some_and(|kink| kink <= SMOOTH) {
+        values.number("kink_max_deg", kink_max_deg(&grids, side));
+    }
 }
 
 fn side_of(count: usize) -> Option<usize> {
@@ -64,75 +74,54 @@ fn tangent(a: DVec3, b: DVec3, c: DVec3) -> DVec3 {
     p / p.length_squared() - q / q.length_squared()
 }
 
-/// Largest angle between the normals of two patches at common places of their borders.
+/// Largest angle between the normals of two patches with a common edge, at the ends of it: between
+/// them the two have their samples at places of their own.
 fn kink_max_deg(grids: &[&[DVec3]], side: usize) -> f64 {
     let last = side - 1;
-    let far = |k: usize| if 2 * k < last { last } else { 0 };
-    let mut borders: Vec<(usize, DVec3, DVec3, bool)> = Vec::new();
-    let mut cell = f64::INFINITY;
-    for (patch, grid) in grids.iter().enumerate() {
+    // Numbers of the corners, equal where patches meet; of each patch in turn.
+    let mut numbers: BTreeMap<[i64; 3], usize> = BTreeMap::new();
+    let size = diagonal(grids.iter().flat_map(|g| g.iter().copied())).unwrap_or(1.0);
+    let mut corners: Vec<[(usize, DVec3); 4]> = Vec::with_capacity(grids.len());
+    for grid in grids {
         let at = |i: usize, j: usize| grid[i * side + j];
-        cell = cell.min(at(0, 0).distance(at(0, 1))).min(at(0, 0).distance(at(1, 0)));
-        for i in 0..side {
-            for j in 0..side {
-                if i != 0 && i != last && j != 0 && j != last {
-                    continue;
-                }
-                // Two more points of each line, the second as far away as it can be.
-                let pick = |k: usize| {
-                    let end = far(k);
-                    let between = usize::midpoint(k, end);
-                    if between == k || between == end { (last - end, end) } else { (between, end) }
-                };
-                let ((i1, i2), (j1, j2)) = (pick(i), pick(j));
-                let along_u = tangent(at(i, j), at(i1, j), at(i2, j)) * sign(i1, i);
-                let along_v = tangent(at(i, j), at(i, j1), at(i, j2)) * sign(j1, j);
-                let is_corner = (i == 0 || i == last) && (j == 0 || j == last);
-                borders.push((patch, at(i, j), along_u.cross(along_v), is_corner));
-            }
+        corners.push([(0, 0), (last, 0), (last, last), (0, last)].map(|(i, j)| {
+            // Two more points of each of the two lines through the corner.
+            let (i1, i2, j1, j2) = (last / 2, last - i, last / 2, last - j);
+            let along = |to: usize| if to > 0 { 1.0 } else { -1.0 };
+            let along_u = tangent(at(i, j), at(i1, j), at(i2, j)) * along(i2);
+            let along_v = tangent(at(i, j), at(i, j1), at(i, j2)) * along(j2);
+            let key = (at(i, j) / (SAME_PLACE * size)).round().to_array().map(|x| x as i64);
+            let next = numbers.len();
+            // Rounding may put one place into neighbouring cells.
+            let around = (-1..=1).flat_map(|x| {
+                (-1..=1)
+                    .flat_map(move |y| (-1..=1).map(move |z| [key[0] + x, key[1] + y, key[2] + z]))
+            });
+            let known = around.filter_map(|cell| numbers.get(&cell)).next().copied();
+            let number = known.unwrap_or_else(|| *numbers.entry(key).or_insert(next));
+            (number, along_u.cross(along_v))
+        }));
+    }
+    // The two ends of every edge, and the normals of its patches there.
+    let mut edges: BTreeMap<[usize; 2], Vec<[DVec3; 2]>> = BTreeMap::new();
+    for patch in &corners {
+        for k in 0..4 {
+            let ((a, m), (b, n)) = (patch[k], patch[(k + 1) % 4]);
+            let (key, normals) = if a < b { ([a, b], [m, n]) } else { ([b, a], [n, m]) };
+            edges.entry(key).or_default().push(normals);
         }
     }
-    pairs(&borders, SAME_PLACE * cell)
-}
-
-/// Of chords towards higher parameters 1, else −1.
-fn sign(to: usize, from: usize) -> f64 {
-    if to > from { 1.0 } else { -1.0 }
-}
-
-/// Compares the points of different patches that are closer than `reach`.
-fn pairs(borders: &[(usize, DVec3, DVec3, bool)], reach: f64) -> f64 {
-    let cell = |p: DVec3| (p / (4.0 * reach)).to_array().map(|x| x.floor() as i64);
-    let mut cells: BTreeMap<[i64; 3], Vec<usize>> = BTreeMap::new();
-    for (k, (_, p, ..)) in borders.iter().enumerate() {
-        cells.entry(cell(*p)).or_default().push(k);
-    }
-    let mut kink = 0.0_f64;
-    for (k, (patch, p, normal, is_corner)) in borders.iter().enumerate() {
-        let [x, y, z] = cell(*p);
-        for dx in -1..=1 {
-            for dy in -1..=1 {
-                for dz in -1..=1 {
-                    for &other in cells.get(&[x + dx, y + dy, z + dz]).into_iter().flatten() {
-                        let (other_patch, q, other_normal, _) = &borders[other];
-                        if other <= k || other_patch == patch || p.distance(*q) > reach {
-                            continue;
-                        }
-                        // Around a corner patches meet that share no edge; kinks are of edges.
-                        if !is_corner {
-                            kink = kink.max(angle_deg(*normal, *other_normal));
-                        }
-                    }
-                }
-            }
-        }
-    }
-    kink
+    let kink = |sides: &Vec<[DVec3; 2]>| match sides[..] {
+        [[a, b], [c, d]] => angle_deg(a, c).max(angle_deg(b, d)),
+        _ => 0.0,
+    };
+    edges.values().map(kink).fold(0.0, f64::max)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use serde_json::json;
 
     /// Patches of a torus between its circles of curvature.
     fn torus(moved: Option<usize>) -> Mesh {
@@ -162,15 +151,19 @@ mod tests {
     #[test]
     fn circles_are_met_and_a_moved_point_is_seen_anywhere() {
         let measure = |mesh: &Mesh| {
+            let metrics = json!({"faces": 2, "kink_max_deg": 0.0});
             let mut values = Values::default();
-            recompute(mesh, 2, &mut values);
-            ["circle_defect_max", "kink_max_deg"].map(|k| values.get(k).unwrap())
+            recompute(mesh, &Claims::new(&metrics), &mut values);
+            ["circle_defect_max", "kink_max_deg", "centroid.2"].map(|k| values.get(k).unwrap())
         };
-        let [defect, kink] = measure(&torus(None));
+        let [defect, kink, height] = measure(&torus(None));
         assert!(defect < 1e-14 && kink < 1e-11, "{defect} {kink}");
         for moved in 0..50 {
-            let [defect, ..] = measure(&torus(Some(moved)));
+            let [defect, _, mean] = measure(&torus(Some(moved)));
             assert!(defect > 1e-6, "{moved}: {defect}");
+            assert!((mean - height - 1e-5 / 50.0).abs() < 1e-14);
         }
+        // A point of the common edge that moves in one patch only is a kink too.
+        assert!(measure(&torus(Some(22)))[1] > 1e-5);
     }
 }

@@ -60,8 +60,8 @@ fn recompute(
         "panel" => panel::recompute(file, input_surface, &mut values),
         "hnet" => hnet::recompute(file, &mut values),
         "darboux" => {
-            if let (Some(mesh), Some(faces)) = (file.mesh(), claims.count("faces")) {
-                darboux::recompute(mesh, faces, &mut values);
+            if let Some(mesh) = file.mesh() {
+                darboux::recompute(mesh, claims, &mut values);
             }
         }
         "asymptotic" => asymptotic::recompute(&file.surfaces, file.size(), &mut values),

@@ -143,7 +143,7 @@ pub const TABLE: &[Row] = &[
     row(
         "darboux",
         &["kink_max_deg"],
-        "the samples (OBJ, PLY): parameter lines are circles through them",
+        "the samples (OBJ, PLY), where the image is smooth: at the ends of edges, by circles",
         only(Accuracy::new(1e-6, 1e-6, 0)),
     ),
     row(
@@ -152,6 +152,7 @@ pub const TABLE: &[Row] = &[
         "the samples (OBJ, PLY)",
         only(Accuracy::new(1e-6, 1e-12, 1)),
     ),
+    row("darboux", &["centroid.*"], "the samples (OBJ, PLY)", only(Accuracy::new(0.0, 1e-13, 1))),
     row("asymptotic", &["patches", "degree"], "the patches (STEP, RON, JSON)", COUNT),
     row(
         "asymptotic",

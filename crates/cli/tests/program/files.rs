@@ -150,7 +150,7 @@ fn refusals_name_the_file_they_speak_of() {
     let with = |more: &[&str]| [&fair[..], more].concat();
     refused(&with(&["--fix", &fix]), &format!("{fix}: constraints name vertex 99999"));
     refused(&with(&["--fix", &weight]), &format!("{weight}: vertex 3 is pulled with weight -2"));
-    refused(&with(&["--creases", &creases]), &format!("{creases}: {number} 20: `1e400`"));
+    refused(&with(&["--creases", &creases]), &format!("{creases}: {number} 19: `1e400`"));
     refused(&with(&["--symmetry", &symmetry]), &format!("{symmetry}: {number}"));
     // Prices, of types that are not used too.
     let csv = name(&folder.path().join("out.csv"));

@@ -100,9 +100,9 @@ fn hnet() {
     let args = ["hnet", "fixtures/nets/enneper.obj"];
     let size = 2e-6;
     let run = Run::of(&args, "a.ron");
-    run.check("a.ron", 12, |text| moved(text, "vertices: [", 0, size));
+    run.check("a.ron", 11, |text| moved(text, "vertices: [", 0, size));
     let run = Run::of(&args, "a.step");
-    run.check("a.step", 12, |text| moved(text, "CARTESIAN_POINT('',(", 40, size));
+    run.check("a.step", 11, |text| moved(text, "CARTESIAN_POINT('',(", 40, size));
 }
 
 #[test]

@@ -43,6 +43,8 @@ pub struct Metrics {
     pub samples: usize,
     /// Largest distance of a sample from the circle its parameter line is: rulings go to circles.
     pub circle_defect_max: f64,
+    /// Mean of the samples.
+    pub centroid: [f64; 3],
 }
 
 /// What a user should know although there is a result.
@@ -140,11 +142,17 @@ pub fn solve(
         sampling_error_max: error,
         samples: result.samples.len(),
         circle_defect_max: circle_defect(&result),
+        centroid: centroid(&result).to_array(),
     };
     let status =
         if status == Status::Interrupted { Status::Interrupted } else { Status::Converged };
     let report = RunReport { status, iterations: 0, stages: Vec::new() };
     Ok(Solution { result, metrics, report, warnings, map, fit, corners })
+}
+
+fn centroid(sampled: &SampledPatches) -> DVec3 {
+    let sum: DVec3 = sampled.samples.iter().map(|s| s.point).sum();
+    sum / sampled.samples.len().max(1) as f64
 }
 
 /// Largest distance of the samples along a parameter line from the circle through the first, the
