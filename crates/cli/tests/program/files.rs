@@ -14,6 +14,11 @@ fn refused(args: &[&str], want: &str) {
     assert!(said.starts_with(&format!("umbilic: {want}")), "{args:?}\nsaid   {said}wanted {want}");
 }
 
+/// A command line with more arguments.
+fn with<'a>(start: &[&'a str], more: &[&'a str]) -> Vec<&'a str> {
+    [start, more].concat()
+}
+
 fn name(path: &Path) -> String {
     path.display().to_string()
 }
@@ -128,17 +133,22 @@ fn refusals_name_the_file_they_speak_of() {
     let not_finite = write("nan.ron", "(fairness: NaN)");
     let negative = write("negative.ron", "(fairness: -1)");
     let weingarten = ["weingarten", "fixtures/eggbox-coarse.ron", "-o", &step];
-    let with = |more: &[&str]| [&weingarten[..], more].concat();
-    refused(&with(&["--config", &not_finite]), &format!("{not_finite}: {number}"));
-    refused(&with(&["--config", &negative]), &format!("{negative}: `fairness` is -1; it must be"));
-    refused(&with(&["--fairness=-1"]), "--fairness is -1; it must be");
-    refused(&with(&["--config", &negative, "--fairness=-2"]), "--fairness is -2; it must be");
+    refused(&with(&weingarten, &["--config", &not_finite]), &format!("{not_finite}: {number}"));
+    refused(
+        &with(&weingarten, &["--config", &negative]),
+        &format!("{negative}: `fairness` is -1; it must be"),
+    );
+    refused(&with(&weingarten, &["--fairness=-1"]), "--fairness is -1; it must be");
+    refused(
+        &with(&weingarten, &["--config", &negative, "--fairness=-2"]),
+        "--fairness is -2; it must be",
+    );
     let tolerance = write("tolerance.ron", "(tolerance: -1)");
     let fit = ["fit", "fixtures/grid.obj", "-o", &step, "--config", &tolerance];
     refused(&fit, &format!("{tolerance}: `tolerance` is -1"));
     // A curve of the diagram.
     let curve = write("curve.ron", "[(0, 1), (0.5, inf)]");
-    let result = umbilic(&with(&[&format!("--relation=curve={curve}")]));
+    let result = umbilic(&with(&weingarten, &[&format!("--relation=curve={curve}")]));
     assert_eq!(result.status.code(), Some(2));
     assert!(message(&result).contains(&format!("{curve}: {number}")), "{}", message(&result));
     // Fixed vertices, creases, symmetries.
@@ -147,26 +157,28 @@ fn refusals_name_the_file_they_speak_of() {
     let creases = write("creases.ron", "(edges: [((0, 1), 1e400)])");
     let symmetry = write("symmetry.ron", "(matrices: [((1, 0, 0), (0, NaN, 0), (0, 0, 1))])");
     let fair = ["fair", "fixtures/quads/cube.obj", "-o", &out, "--levels", "0"];
-    let with = |more: &[&str]| [&fair[..], more].concat();
-    refused(&with(&["--fix", &fix]), &format!("{fix}: constraints name vertex 99999"));
-    refused(&with(&["--fix", &weight]), &format!("{weight}: vertex 3 is pulled with weight -2"));
-    refused(&with(&["--creases", &creases]), &format!("{creases}: {number} 19: `1e400`"));
-    refused(&with(&["--symmetry", &symmetry]), &format!("{symmetry}: {number}"));
+    refused(&with(&fair, &["--fix", &fix]), &format!("{fix}: constraints name vertex 99999"));
+    refused(
+        &with(&fair, &["--fix", &weight]),
+        &format!("{weight}: vertex 3 is pulled with weight -2"),
+    );
+    refused(&with(&fair, &["--creases", &creases]), &format!("{creases}: {number} 19: `1e400`"));
+    refused(&with(&fair, &["--symmetry", &symmetry]), &format!("{symmetry}: {number}"));
     // Prices, of types that are not used too.
     let csv = name(&folder.path().join("out.csv"));
     let prices = write("prices.ron", "{plane: (mold: 1, panel: NaN)}");
     let below = write("below.ron", "{plane: (mold: 1, panel: 1), torus: (mold: -1, panel: 1)}");
-    let panel = ["panel", "fixtures/roof.ron", "-o", &csv, "--panels", "3x3"];
-    let with = |more: &[&str]| [&panel[..], &["--mold-types", "plane"], more].concat();
-    refused(&with(&["--prices", &prices]), &format!("{prices}: {number}"));
-    refused(&with(&["--prices", &below]), &format!("{below}: the price of torus is -1"));
+    let panel =
+        ["panel", "fixtures/roof.ron", "-o", &csv, "--panels", "3x3", "--mold-types", "plane"];
+    refused(&with(&panel, &["--prices", &prices]), &format!("{prices}: {number}"));
+    refused(&with(&panel, &["--prices", &below]), &format!("{below}: the price of torus is -1"));
     // A cage, and a net it cannot transform.
     let corner = "(0, 0, 0), (1, 0, 0), (0, 1, 0), (1, 1, 0)";
     let flat = write("flat.ron", &format!("(images: [{corner}, {corner}])"));
     let wild = write("wild.ron", &format!("(images: [{corner}, (0, inf, 0), {corner}])"));
     let darboux = ["darboux", "fixtures/nets/enneper.obj", "-o", &glb, "--cage"];
-    refused(&[&darboux[..], &[&flat]].concat(), &format!("{flat}: the cage has no transformation"));
-    refused(&[&darboux[..], &[&wild]].concat(), &format!("{wild}: {number}"));
+    refused(&with(&darboux, &[&flat]), &format!("{flat}: the cage has no transformation"));
+    refused(&with(&darboux, &[&wild]), &format!("{wild}: {number}"));
 }
 
 #[test]
