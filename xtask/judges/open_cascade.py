@@ -2,22 +2,32 @@
 
 usage: open_cascade.py FILE [SAMPLES]
 
-Prints {"roots": n, "valid": bool, "faces": [{"name": .., "domain": [u0, u1, v0, v1],
-"samples": [[u, v, x, y, z, K, H], ..]}]}; the grid includes both ends of both parameters.
+Prints {"roots": n, "valid": bool, "solids": n, "shells": n, "edges": n, "open_edges": n,
+"volume": .., "box": [x0, y0, z0, x1, y1, z1], "faces": [{"area": .., "domain": [u0, u1, v0, v1],
+"samples": [[u, v, x, y, z, K, H], ..]}]}; the grid includes both ends of both parameters. Edges
+without length are not counted; open ones have one face.
 Lengths are millimetres, as Open CASCADE converts them.
 """
 
 import json
 import sys
 
+from OCP.Bnd import Bnd_Box
 from OCP.BRep import BRep_Tool
+from OCP.BRepBndLib import BRepBndLib
 from OCP.BRepCheck import BRepCheck_Analyzer
+from OCP.BRepGProp import BRepGProp
 from OCP.GeomLProp import GeomLProp_SLProps
+from OCP.GProp import GProp_GProps
 from OCP.IFSelect import IFSelect_RetDone
 from OCP.STEPControl import STEPControl_Reader
-from OCP.TopAbs import TopAbs_FACE
-from OCP.TopExp import TopExp_Explorer
+from OCP.TopAbs import TopAbs_EDGE, TopAbs_FACE, TopAbs_SHELL, TopAbs_SOLID
+from OCP.TopExp import TopExp, TopExp_Explorer
 from OCP.TopoDS import TopoDS
+from OCP.TopTools import (
+    TopTools_IndexedDataMapOfShapeListOfShape,
+    TopTools_IndexedMapOfShape,
+)
 
 
 def samples_of(surface, count):
@@ -39,8 +49,45 @@ def samples_of(surface, count):
     return [u0, u1, v0, v1], found
 
 
+def count(shape, kind):
+    found = TopTools_IndexedMapOfShape()
+    TopExp.MapShapes_s(shape, kind, found)
+    return found.Extent()
+
+
+def edges_by_faces(shape):
+    """Numbers of edges with length, and of those among them with one face."""
+    faces_of = TopTools_IndexedDataMapOfShapeListOfShape()
+    TopExp.MapShapesAndAncestors_s(shape, TopAbs_EDGE, TopAbs_FACE, faces_of)
+    edges, open_edges = 0, 0
+    for k in range(1, faces_of.Extent() + 1):
+        if not BRep_Tool.Degenerated_s(TopoDS.Edge_s(faces_of.FindKey(k))):
+            edges += 1
+            open_edges += faces_of.FindFromIndex(k).Size() == 1
+    return edges, open_edges
+
+
+def volume_of(shape):
+    properties = GProp_GProps()
+    BRepGProp.VolumeProperties_s(shape, properties, 1e-9)
+    return properties.Mass()
+
+
+def box_of(shape):
+    box = Bnd_Box()
+    BRepBndLib.AddOptimal_s(shape, box, False, False)
+    low, high = box.CornerMin(), box.CornerMax()
+    return [low.X(), low.Y(), low.Z(), high.X(), high.Y(), high.Z()]
+
+
+def area_of(face):
+    properties = GProp_GProps()
+    BRepGProp.SurfaceProperties_s(face, properties, 1e-9)
+    return properties.Mass()
+
+
 def main():
-    count = int(sys.argv[2]) if len(sys.argv) > 2 else 9
+    samples = int(sys.argv[2]) if len(sys.argv) > 2 else 9
     reader = STEPControl_Reader()
     if reader.ReadFile(sys.argv[1]) != IFSelect_RetDone:
         sys.exit(f"{sys.argv[1]}: Open CASCADE cannot read it")
@@ -49,12 +96,24 @@ def main():
     faces = []
     explorer = TopExp_Explorer(shape, TopAbs_FACE)
     while explorer.More():
-        surface = BRep_Tool.Surface_s(TopoDS.Face_s(explorer.Current()))
-        domain, found = samples_of(surface, count)
-        faces.append({"domain": domain, "samples": found})
+        face = TopoDS.Face_s(explorer.Current())
+        domain, found = samples_of(BRep_Tool.Surface_s(face), samples)
+        faces.append({"area": area_of(face), "domain": domain, "samples": found})
         explorer.Next()
     valid = BRepCheck_Analyzer(shape).IsValid()
-    json.dump({"roots": roots, "valid": valid, "faces": faces}, sys.stdout)
+    edges, open_edges = edges_by_faces(shape)
+    found = {
+        "roots": roots,
+        "valid": valid,
+        "solids": count(shape, TopAbs_SOLID),
+        "shells": count(shape, TopAbs_SHELL),
+        "edges": edges,
+        "open_edges": open_edges,
+        "volume": volume_of(shape) if count(shape, TopAbs_SOLID) > 0 else 0.0,
+        "box": box_of(shape),
+        "faces": faces,
+    }
+    json.dump(found, sys.stdout)
 
 
 if __name__ == "__main__":

@@ -64,8 +64,10 @@ fn wasm(skipped: &mut Vec<String>) -> Outcome {
 fn tests(skipped: &mut Vec<String>) -> Outcome {
     let mut command =
         cargo(&["test", "--workspace", "--no-fail-fast", "--quiet", "--", "--show-output"]);
-    // The same random cases every time, so that a red run can be repeated.
-    command.stdout(Stdio::piped()).current_dir(root()).env("PROPTEST_RNG_SEED", "1");
+    // The same random cases every time, so that a red run can be repeated; a text that differs from
+    // its snapshot is an error, never a new snapshot.
+    command.env("PROPTEST_RNG_SEED", "1").env("INSTA_UPDATE", "no");
+    command.stdout(Stdio::piped()).current_dir(root());
     let mut child = command.spawn().map_err(|e| format!("cargo test could not start: {e}"))?;
     let output = child.stdout.take().ok_or("cargo test has no output")?;
     let mut log = String::new();

@@ -1,10 +1,17 @@
 //! `cargo xtask judges`: written files read again by independent programs.
 //!
 //! Open CASCADE evaluates every face of a STEP file on a grid of parameters; points, Gaussian and
-//! mean curvature must agree with our own evaluation of the same file. geomdl does the same with
-//! points and derivatives of its own format. The glTF validator must find no error in a GLB file.
+//! mean curvature and the areas of faces must agree with our own evaluation of the same file, which
+//! it must find to be one valid shell. geomdl does the same with
+//! points and derivatives of its own format. rhino3dm reads our 3DM files, and we read its own. The
+//! glTF validator must find no error in a GLB file.
 //! What is not installed is skipped by name.
 
+mod reading;
+mod rhino;
+mod verdict;
+
+use self::verdict::{Face, Verdict, ask};
 use crate::shell::{Outcome, build_umbilic, check, root, umbilic};
 use bspline::BsplineSurface;
 use serde::Deserialize;
@@ -14,24 +21,8 @@ use std::process::Command;
 /// Largest difference of points (times the size of the surface) and of curvatures (times their
 /// largest size on the face) that counts as agreement.
 const AGREEMENT: f64 = 1e-8;
-/// Samples per direction of every face, both ends included.
-const SAMPLES: usize = 9;
-
-/// What the judge of Open CASCADE prints.
-#[derive(Deserialize)]
-struct Verdict {
-    roots: usize,
-    valid: bool,
-    faces: Vec<Face>,
-}
-
-#[derive(Deserialize)]
-struct Face {
-    domain: [f64; 4],
-    /// u, v, x, y, z, K, H; millimetres.
-    samples: Vec<[f64; 7]>,
-}
-
+/// Largest relative difference of the areas of a face that counts as agreement.
+const AREA_AGREEMENT: f64 = 1e-6;
 /// What the judge of geomdl prints of one surface.
 #[derive(Deserialize)]
 struct Derivatives {
@@ -157,15 +148,23 @@ pub(crate) fn run() -> Outcome {
     build_umbilic()?;
     let python = python_with("OCP");
     let geomdl = python_with("geomdl");
+    let rhino = python_with("rhino3dm");
     let node = node_with_validator();
     for (missing, name, wanted) in [
         (python.is_none(), "Open CASCADE", "a python3 (or UMBILIC_JUDGE_PYTHON) with OCP 7.9.3.1"),
+        (rhino.is_none(), "rhino3dm", "a python3 (or UMBILIC_JUDGE_PYTHON) with rhino3dm 8"),
         (geomdl.is_none(), "geomdl", "a python3 (or UMBILIC_JUDGE_PYTHON) with geomdl 5"),
         (node.is_none(), "the glTF validator", "node with gltf-validator on NODE_PATH"),
     ] {
         if missing {
             println!("SKIPPED {name}: needs {wanted}");
         }
+    }
+    if let Some(python) = &python {
+        reading::judge(python)?;
+    }
+    if let Some(python) = &rhino {
+        rhino::judge(python)?;
     }
     for (k, case) in CASES.iter().enumerate() {
         let out = root().join("target/judges").join(k.to_string());
@@ -209,18 +208,6 @@ fn node_with_validator() -> Option<PathBuf> {
     tried.is_ok_and(|output| output.status.success()).then(|| "node".into())
 }
 
-/// What a judge in Python prints about a file.
-fn ask(python: &Path, judge: &str, file: &Path) -> Outcome<String> {
-    let mut command = Command::new(python);
-    command.arg(root().join("xtask/judges").join(judge)).arg(file).arg(SAMPLES.to_string());
-    let output = command.output().map_err(|e| format!("the judge could not start: {e}"))?;
-    if output.status.success() {
-        Ok(String::from_utf8_lossy(&output.stdout).into_owned())
-    } else {
-        Err(String::from_utf8_lossy(&output.stderr).into_owned())
-    }
-}
-
 /// Compares points and derivatives, each relative to the largest of its order on the surface.
 fn judge_json(python: &Path, file: &Path) -> Outcome<String> {
     let theirs: Vec<Derivatives> = serde_json::from_str(&ask(python, "spline_library.py", file)?)
@@ -262,11 +249,7 @@ fn judge_json(python: &Path, file: &Path) -> Outcome<String> {
 
 /// Compares every sample of every face; returns the largest differences in words.
 fn judge_step(python: &Path, file: &Path, asymptotic: bool) -> Outcome<String> {
-    let text = ask(python, "open_cascade.py", file)?;
-    // The reader itself may print a report before the JSON.
-    let json = text.find("{\"roots\"").map_or("", |at| &text[at..]);
-    let verdict: Verdict =
-        serde_json::from_str(json).map_err(|e| format!("the judge said: {e}"))?;
+    let verdict = Verdict::of(python, file)?;
     let model = exchange::read_model(file).map_err(|e| e.to_string())?;
     if !verdict.valid || verdict.roots == 0 {
         return Err("Open CASCADE finds the shape invalid".to_owned());
@@ -279,6 +262,15 @@ fn judge_step(python: &Path, file: &Path, asymptotic: bool) -> Outcome<String> {
     let mut worst = Differences::default();
     for (face, named) in verdict.faces.iter().zip(&model.surfaces) {
         worst.merge(&compare(face, &named.surface, scale, asymptotic)?);
+        let ours = named.curvature_statistics().area * scale * scale;
+        // Written so that NaN is a disagreement.
+        if !((face.area / ours - 1.0).abs() <= AREA_AGREEMENT) {
+            return Err(format!("an area of {}, we measure {ours}", face.area));
+        }
+    }
+    // All cases are surfaces in one piece.
+    if verdict.shells != 1 {
+        return Err(format!("Open CASCADE finds {} shells, one was expected", verdict.shells));
     }
     worst.check(verdict.faces.len())
 }

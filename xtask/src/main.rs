@@ -6,6 +6,7 @@ mod ci;
 mod dist;
 mod fuzz;
 mod judges;
+mod nightly;
 mod regress;
 mod scene;
 mod shell;
@@ -24,6 +25,7 @@ cargo xtask <chore>
   bench [PACKAGE…]         run the benches and record them in docs/benchmarks.md
   dist                     man pages and shell completions into target/dist
   fuzz SECONDS [TARGET…]   fuzz the readers and the solver, each for so long
+  nightly                  what takes too long for every change; writes docs/nightly.md
   bench --proof            run the solver on the public test sets, write docs/solver-proof.md
 ";
 
@@ -37,6 +39,7 @@ fn main() -> ExitCode {
         ["regress", names @ ..] => regress::run(names).map(|_| ()),
         ["judges"] => judges::run(),
         ["bench", "--proof"] => bench::proof(),
+        ["nightly"] => nightly::run(),
         ["dist"] => dist::run(),
         ["fuzz", seconds, targets @ ..] => fuzz::run(seconds, targets),
         ["bench", packages @ ..] => bench::run(packages),

@@ -39,10 +39,23 @@ impl fmt::Display for Place {
 }
 
 /// Why corner data or a net cannot be bounded by asymptotic curves or filled.
+///
+/// # Example
+/// ```
+/// use asymptotic_bezier::{Options, solve};
+/// use geom_core::{DVec3, PolyMesh};
+/// let triangle = PolyMesh::new(vec![DVec3::ZERO, DVec3::X, DVec3::Y], &[[0, 1, 2]])?;
+/// let error = solve(&triangle.into(), &Options::default(), &mut ()).unwrap_err();
+/// assert!(error.to_string().contains("face 0"), "{error}");
+/// # Ok::<(), geom_core::MeshError>(())
+/// ```
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 #[expect(missing_docs, reason = "the messages spell out every field")]
 pub enum Error {
+    /// No extent, too much of it, or too far away.
+    #[error(transparent)]
+    Size(#[from] geom_core::NormalizationError),
     /// NaN or infinity in the input.
     #[error("{place}: {what} is not finite; every coordinate and curvature must be a number")]
     NotFinite { place: Place, what: &'static str },

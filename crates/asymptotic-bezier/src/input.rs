@@ -9,6 +9,24 @@ use crate::error::Error;
 use crate::wishes::TorsionWish;
 
 /// What is to be bounded by asymptotic curves, with wishes for torsions.
+///
+/// # Example
+/// ```
+/// use asymptotic_bezier::{Input, InputData};
+/// # use geom_core::{DVec3, PolyMesh};
+/// # let point = |k: usize| {
+/// #     let (p, q) = (0.2 + 0.3 * (k / 4) as f64, 0.1 + 0.3 * (k % 4) as f64);
+/// #     let (u, v) = (0.5 * (p + q), 0.5 * (p - q));
+/// #     DVec3::new(u - u.powi(3) / 3.0 + u * v * v, v - v.powi(3) / 3.0 + v * u * u, u * u - v * v)
+/// # };
+/// # let corner = |k: u32| 4 * (k / 3) + k % 3;
+/// # let faces: Vec<[u32; 4]> = (0..9).map(corner).map(|a| [a, a + 4, a + 5, a + 1]).collect();
+/// // Nine quads along asymptotic lines of Enneper's surface.
+/// let mesh = PolyMesh::new((0..16).map(point).collect(), &faces)?;
+/// let input = Input::from(mesh);
+/// assert!(matches!(input.data, InputData::Mesh(_)) && input.torsions.is_empty());
+/// # Ok::<(), geom_core::MeshError>(())
+/// ```
 #[derive(Clone, Debug, PartialEq)]
 pub struct Input {
     /// Where the curves come from.

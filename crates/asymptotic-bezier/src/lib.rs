@@ -41,6 +41,7 @@ mod lamella;
 mod metrics;
 mod options;
 mod patch;
+mod place;
 mod relax;
 mod shell;
 mod solve;

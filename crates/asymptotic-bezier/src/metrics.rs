@@ -4,6 +4,25 @@ use crate::patch::verify::PatchCheck;
 use crate::shell::gridshell::{Gridshell, GridshellCheck};
 
 /// Numbers of a filled net as they are reported; one patch is a net of one face.
+///
+/// # Example
+/// ```
+/// use asymptotic_bezier::{Options, solve};
+/// # use geom_core::{DVec3, PolyMesh};
+/// # let point = |k: usize| {
+/// #     let (p, q) = (0.2 + 0.3 * (k / 4) as f64, 0.1 + 0.3 * (k % 4) as f64);
+/// #     let (u, v) = (0.5 * (p + q), 0.5 * (p - q));
+/// #     DVec3::new(u - u.powi(3) / 3.0 + u * v * v, v - v.powi(3) / 3.0 + v * u * u, u * u - v * v)
+/// # };
+/// # let corner = |k: u32| 4 * (k / 3) + k % 3;
+/// # let faces: Vec<[u32; 4]> = (0..9).map(corner).map(|a| [a, a + 4, a + 5, a + 1]).collect();
+/// // Nine quads along asymptotic lines of Enneper's surface.
+/// let mesh = PolyMesh::new((0..16).map(point).collect(), &faces)?;
+/// let metrics = solve(&mesh.into(), &Options::default(), &mut ())?.metrics;
+/// assert_eq!((metrics.patches, metrics.positive_gauss_fraction), (9, 0.0));
+/// assert!(metrics.kink_max_deg < 1e-6 && metrics.min_sine > 0.5);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Clone, Debug, PartialEq, serde::Serialize)]
 pub struct Metrics {
     /// Number of patches.

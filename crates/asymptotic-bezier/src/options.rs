@@ -52,6 +52,14 @@ serde_as_text!(Wish);
 
 options! {
     /// Settings of a run.
+    ///
+    /// # Example
+    /// ```
+    /// use asymptotic_bezier::{Ansatz, Joins, Options};
+    /// let options = Options { joins: Joins::G2, degree: Some(9), ..Options::default() };
+    /// assert_eq!((options.ansatz, options.boundary_degree), (Ansatz::Module, None));
+    /// assert!(Options::FIELDS.iter().any(|field| field.name == "joins"));
+    /// ```
     #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
     #[serde(default, deny_unknown_fields)]
     pub struct Options {

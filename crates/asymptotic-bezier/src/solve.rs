@@ -2,6 +2,7 @@
 
 use std::collections::BTreeMap;
 
+use geom_core::DVec3;
 use gp_solver::{Extra, Fingerprint, Observer, Problem, RunReport, Status, Variables};
 
 use crate::boundary::options::{BoundaryOptions, TorsionHandle};
@@ -17,6 +18,7 @@ use crate::lamella::strip::{Lamella, LamellaOptions, lamellas};
 use crate::metrics::Metrics;
 use crate::options::Options;
 use crate::patch::solve::{FilledPatch, patch_problem};
+use crate::place::Moved;
 use crate::relax::model::MovableNet;
 use crate::relax::relaxed::{RelaxOptions, Relaxed, relaxed_of, relaxed_patch_of};
 use crate::shell::gridshell::{
@@ -30,6 +32,26 @@ use crate::watch::{Entry, Watch};
 use crate::wishes::{TorsionWish, torsion_handles};
 
 /// A solved, filled and measured net; one patch is a net of one face.
+///
+/// # Example
+/// ```
+/// use asymptotic_bezier::{Options, Status, solve};
+/// # use geom_core::{DVec3, PolyMesh};
+/// # let point = |k: usize| {
+/// #     let (p, q) = (0.2 + 0.3 * (k / 4) as f64, 0.1 + 0.3 * (k % 4) as f64);
+/// #     let (u, v) = (0.5 * (p + q), 0.5 * (p - q));
+/// #     DVec3::new(u - u.powi(3) / 3.0 + u * v * v, v - v.powi(3) / 3.0 + v * u * u, u * u - v * v)
+/// # };
+/// # let corner = |k: u32| 4 * (k / 3) + k % 3;
+/// # let faces: Vec<[u32; 4]> = (0..9).map(corner).map(|a| [a, a + 4, a + 5, a + 1]).collect();
+/// // Nine quads along asymptotic lines of Enneper's surface.
+/// let mesh = PolyMesh::new((0..16).map(point).collect(), &faces)?;
+/// let solution = solve(&mesh.into(), &Options::default(), &mut ())?;
+/// assert_eq!(solution.report.status, Status::Converged);
+/// assert_eq!((solution.result.patches.len(), solution.check.joins.len()), (9, 12));
+/// assert!(solution.metrics.normal_curvature_max < 1e-9);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Clone, Debug, PartialEq)]
 pub struct Solution {
     /// Curves and patches.
@@ -46,7 +68,8 @@ pub struct Solution {
     pub mean_jump_before: Option<f64>,
     /// What the relaxed mode did, when asked for.
     pub relaxed: Option<Relaxed>,
-    /// What the solver did: [`Status::Stalled`] if a relaxation found no acceptable data, else
+    /// What the solver did: [`Status::Partial`] or [`Status::Failed`] if patches cross themselves, by
+    /// [`Status::checked`]; [`Status::Stalled`] if a relaxation found no acceptable data, else
     /// [`Status::Converged`]; steps and stages are those of the least-squares solves, the others end
     /// at once.
     pub report: RunReport,
@@ -155,8 +178,26 @@ pub fn solve_with(
 ///
 /// # Errors
 /// As [`solve`]; [`Error::NoSuchStage`] for quartics and joins that have none.
+///
+/// # Example
+/// ```
+/// use asymptotic_bezier::{Options, Phase, problem};
+/// # use geom_core::{DVec3, PolyMesh};
+/// # let point = |k: usize| {
+/// #     let (p, q) = (0.2 + 0.3 * (k / 4) as f64, 0.1 + 0.3 * (k % 4) as f64);
+/// #     let (u, v) = (0.5 * (p + q), 0.5 * (p - q));
+/// #     DVec3::new(u - u.powi(3) / 3.0 + u * v * v, v - v.powi(3) / 3.0 + v * u * u, u * u - v * v)
+/// # };
+/// # let corner = |k: u32| 4 * (k / 3) + k % 3;
+/// # let faces: Vec<[u32; 4]> = (0..9).map(corner).map(|a| [a, a + 4, a + 5, a + 1]).collect();
+/// // Nine quads along asymptotic lines of Enneper's surface.
+/// let mesh = PolyMesh::new((0..16).map(point).collect(), &faces)?;
+/// let problem = problem(&mesh.into(), &Options::default(), Phase::Joint)?;
+/// assert!(problem.unknowns() > 0);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 pub fn problem(input: &Input, options: &Options, phase: Phase) -> Result<Problem<'static>, Error> {
-    let prepared = Prepared::new(input, options)?;
+    let prepared = Prepared::new(input, -input.center()?, options)?;
     let (boundary, patch) = (&prepared.boundary, options.patch());
     let mut nobody = ();
     let watch = &mut Watch::quiet(&mut nobody);
@@ -203,9 +244,10 @@ struct Prepared {
 }
 
 impl Prepared {
-    fn new(input: &Input, options: &Options) -> Result<Self, Error> {
+    /// The data moved by a vector, and how their curves are to be solved.
+    fn new(input: &Input, by: DVec3, options: &Options) -> Result<Self, Error> {
         options.check()?;
-        let data = input.data.resolve()?;
+        let data = input.data.clone().moved(by).resolve()?;
         let mut wishes: BTreeMap<String, TorsionWish> = input.torsions.clone();
         for w in options.torsion.iter() {
             wishes.insert(w.corner.clone(), TorsionWish::Between(w.min, w.max));
@@ -229,10 +271,11 @@ fn run(
     extra: Option<&mut Extra<'_, Error>>,
     observer: &mut dyn Observer,
 ) -> Result<Solution, Error> {
-    let prepared = Prepared::new(input, options)?;
+    let center = input.center()?;
+    let prepared = Prepared::new(input, -center, options)?;
     let fingerprint = Fingerprint::new().text(&format!("{input:?} {options:?}")).finish();
     let stages = 2 + usize::from(options.relaxed);
-    let mut watch = Watch::new(observer, extra, fingerprint, stages)?;
+    let mut watch = Watch::new(observer, extra, fingerprint, stages, center)?;
     let filled = match &prepared.data {
         NetData::Patch(data) => fill_one(data, prepared.boundary, options, &mut watch)?,
         NetData::Net(net) => fill_all(net, prepared.boundary, options, &mut watch)?,
@@ -247,15 +290,17 @@ fn run(
     }
     let acceptable = relaxed.as_ref().is_none_or(|r| r.acceptable);
     let status = if acceptable { Status::Converged } else { Status::Stalled };
+    let crossing = check.patches.iter().filter(|patch| patch.self_intersections > 0).count();
+    let status = status.checked(crossing, check.patches.len());
     let (iterations, stages) = watch.into_reports();
     Ok(Solution {
         metrics: Metrics::new(&shell, &check),
-        result: shell,
-        net,
+        result: shell.moved(center),
+        net: net.moved(center),
         check,
         warnings,
         mean_jump_before,
-        relaxed,
+        relaxed: relaxed.map(|relaxed| relaxed.moved(center)),
         report: RunReport { status, iterations, stages },
     })
 }

@@ -3,6 +3,7 @@
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::time::Duration;
 
+use geom_core::DVec3;
 use gp_solver::{
     Checkpoint, Extra, Observer, Options as SolverOptions, Problem, Progress, Run, SolverError,
     Stage, StageReport, Status, System,
@@ -60,6 +61,7 @@ impl<'w, 'e> Watch<'w, 'e> {
         extra: Option<&'w mut Extra<'e, Error>>,
         fingerprint: u64,
         stages: usize,
+        origin: DVec3,
     ) -> Result<Self, Error> {
         let resumed = observer.resume();
         let mut watch = Self {
@@ -67,7 +69,7 @@ impl<'w, 'e> Watch<'w, 'e> {
             extra,
             heeded: true,
             fingerprint,
-            stage: Stage::new("", 0, stages),
+            stage: Stage::new("", 0, stages).at(origin.to_array(), 1.0),
             entries: Vec::new(),
             next: 0,
             current: None,
@@ -107,7 +109,15 @@ impl<'w, 'e> Watch<'w, 'e> {
 
     /// Begins a stage.
     pub(crate) fn enter(&mut self, name: &str, number: usize) {
-        self.stage = Stage::new(name, number, self.stage.count);
+        let Stage { count, origin, unit, .. } = self.stage;
+        self.stage = Stage::new(name, number, count).at(origin, unit);
+    }
+
+    /// The stage that was begun last, its unknowns counted from a point of what is solved, which has
+    /// been moved to the origin already.
+    pub(crate) fn stage_from(&self, point: DVec3) -> Stage {
+        let Stage { origin, unit, .. } = self.stage;
+        self.stage.clone().at((DVec3::from_array(origin) + point).to_array(), unit)
     }
 
     /// The stage that was begun last.

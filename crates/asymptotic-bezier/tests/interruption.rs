@@ -9,14 +9,16 @@ use std::time::{Duration, Instant};
 use asymptotic_bezier::{
     AsymptoticNet, CurveForm, Error, Input, Joins, NetCurve, Options, Solution, solve,
 };
-use common::{Gauss, catenoid, enneper, exact_net, sampled_net};
+use common::{Gauss, catenoid, enneper, exact_net, noisy, reference_set, sampled_net};
 use gp_solver::{Checkpoint, Observer, Progress};
 
-/// Stops at a step and keeps the last checkpoint.
+/// Stops at a step, or at a question, and keeps the last checkpoint.
 #[derive(Default)]
 struct Stopping {
     steps: usize,
     stop_at: usize,
+    questions: usize,
+    stop_at_question: Option<usize>,
     checkpoints: usize,
     kept: Option<Checkpoint>,
     resume: Option<Checkpoint>,
@@ -26,6 +28,11 @@ impl Observer for Stopping {
     fn step(&mut self, _: &Progress<'_>) -> ControlFlow<()> {
         self.steps += 1;
         if self.steps == self.stop_at { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+    }
+
+    fn stop_requested(&mut self) -> bool {
+        self.questions += 1;
+        self.stop_at_question.is_some_and(|last| self.questions > last)
     }
 
     fn checkpoint(&mut self, state: &dyn Fn() -> Checkpoint) {
@@ -45,26 +52,50 @@ fn bits(solution: &Solution) -> Vec<u64> {
     points.chain(energies).map(f64::to_bits).collect()
 }
 
-/// Interrupts at ten moments, writes and reads the checkpoint, resumes, compares.
+/// Interrupts, writes and reads the checkpoint, resumes, compares; whether there was something to
+/// interrupt.
+fn resumes(input: &Input, options: &Options, mut first: Stopping, expected: &Solution) -> bool {
+    let case = format!("step {}, question {:?}", first.stop_at, first.stop_at_question);
+    match solve(input, options, &mut first) {
+        Err(Error::Interrupted { .. }) => {}
+        // How many questions there are depends on the time it takes.
+        Ok(_) if first.stop_at_question.is_some() => return false,
+        other => panic!("{case}: {other:?}"),
+    }
+    // A run stopped before its first checkpoint starts over.
+    let text = serde_json::to_string(&first.kept).unwrap();
+    let resume: Option<Checkpoint> = serde_json::from_str(&text).unwrap();
+    let mut second = Stopping { resume, ..Default::default() };
+    let resumed = solve(input, options, &mut second).unwrap();
+    assert!(bits(&resumed) == bits(expected), "{case}");
+    assert_eq!(resumed.metrics, expected.metrics, "{case}");
+    assert_eq!(resumed.warnings, expected.warnings, "{case}");
+    assert_eq!(resumed.report.iterations, expected.report.iterations, "{case}");
+    true
+}
+
+/// Interrupts at ten steps.
 fn resumes_to_the_same_bytes(input: &Input, options: &Options) {
     let mut whole = Stopping::default();
     let expected = solve(input, options, &mut whole).unwrap();
     assert!(whole.steps > 10, "{} steps", whole.steps);
     for k in 1..=10 {
         let stop_at = 1 + (whole.steps - 1) * k / 10;
-        let mut first = Stopping { stop_at, ..Default::default() };
-        let error = solve(input, options, &mut first).unwrap_err();
-        assert!(matches!(error, Error::Interrupted { .. }), "{error}");
-        // A run stopped before its first checkpoint starts over.
-        let text = serde_json::to_string(&first.kept).unwrap();
-        let resume: Option<Checkpoint> = serde_json::from_str(&text).unwrap();
-        let mut second = Stopping { resume, ..Default::default() };
-        let resumed = solve(input, options, &mut second).unwrap();
-        assert!(bits(&resumed) == bits(&expected), "stopped at step {stop_at}");
-        assert_eq!(resumed.metrics, expected.metrics);
-        assert_eq!(resumed.warnings, expected.warnings);
-        assert_eq!(resumed.report.iterations, expected.report.iterations);
+        let first = Stopping { stop_at, ..Default::default() };
+        assert!(resumes(input, options, first, &expected));
     }
+}
+
+/// Interrupts at ten questions, for stages that are solved at once.
+fn resumes_anywhere_to_the_same_bytes(input: &Input, options: &Options) {
+    let mut whole = Stopping::default();
+    let expected = solve(input, options, &mut whole).unwrap();
+    let interrupted = (0..10).filter(|k| {
+        let stop_at_question = Some(k * whole.questions / 10);
+        resumes(input, options, Stopping { stop_at_question, ..Default::default() }, &expected)
+    });
+    let interrupted = interrupted.count();
+    assert!(interrupted >= 5, "{interrupted} of {} questions came", whole.questions);
 }
 
 /// A net whose tangents and curvatures have one percent of noise.
@@ -97,6 +128,21 @@ fn curves_from_normals_end_with_the_same_bytes() {
     let mesh = sampled_net(enneper, [-0.5, 0.6, -0.7, 0.5], [4, 4]);
     let options = Options { curves: CurveForm::Normals, joins: Joins::C1, ..Options::default() };
     resumes_to_the_same_bytes(&mesh.into(), &options);
+}
+
+#[test]
+fn corner_data_ends_with_the_same_bytes() {
+    let data = noisy(&reference_set("A").data, 0.01, 2);
+    let relaxed = Options { relaxed: true, ..Options::default() };
+    resumes_anywhere_to_the_same_bytes(&data.into(), &relaxed);
+    let exact = reference_set("B").data;
+    resumes_anywhere_to_the_same_bytes(&exact.into(), &Options::default());
+}
+
+#[test]
+fn nets_by_default_end_with_the_same_bytes() {
+    let mesh = sampled_net(enneper, [-0.5, 0.6, -0.7, 0.5], [5, 5]);
+    resumes_anywhere_to_the_same_bytes(&mesh.into(), &Options::default());
 }
 
 #[test]

@@ -30,6 +30,18 @@ impl BsplineCurve {
     ///
     /// # Errors
     /// [`SplineError`] says which count or number is at fault.
+    ///
+    /// # Example
+    /// ```
+    /// use bspline::{BsplineCurve, Degree, KnotVector};
+    /// use geom_core::DVec3;
+    /// // A quarter of the unit circle, exact by its weights.
+    /// let knots = KnotVector::clamped_uniform(Degree::new(2)?, 3)?;
+    /// let points = vec![DVec3::X, DVec3::X + DVec3::Y, DVec3::Y];
+    /// let arc = BsplineCurve::new(knots, points, Some(vec![1.0, 0.5_f64.sqrt(), 1.0]))?;
+    /// assert!((arc.point(0.3).length() - 1.0).abs() < 1e-15);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
     pub fn new(
         knots: KnotVector,
         control_points: Vec<DVec3>,
@@ -58,6 +70,17 @@ impl BsplineCurve {
     }
 
     /// The point at parameter `t`.
+    ///
+    /// # Example
+    /// ```
+    /// use bspline::{BsplineCurve, Degree, KnotVector};
+    /// use geom_core::DVec3;
+    /// // A parabola as a Bézier curve: its middle is half way to the middle control point.
+    /// let knots = KnotVector::clamped_uniform(Degree::new(2)?, 3)?;
+    /// let parabola = BsplineCurve::new(knots, vec![-DVec3::X, 2.0 * DVec3::Y, DVec3::X], None)?;
+    /// assert_eq!(parabola.point(0.5), DVec3::Y);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
     #[must_use]
     pub fn point(&self, t: f64) -> DVec3 {
         self.derivatives(t, 0)[0]
@@ -67,6 +90,20 @@ impl BsplineCurve {
     ///
     /// # Panics
     /// If `order` exceeds [`MAX_DERIVATIVE`].
+    ///
+    /// # Example
+    /// ```
+    /// use bspline::{BsplineCurve, Degree, KnotVector};
+    /// use geom_core::DVec3;
+    /// let knots = KnotVector::clamped_uniform(Degree::new(2)?, 3)?; // (2 t − t², t²)
+    /// let points = vec![DVec3::ZERO, DVec3::X, DVec3::X + DVec3::Y];
+    /// let parabola = BsplineCurve::new(knots, points, None)?;
+    /// let [point, velocity, acceleration, ..] = parabola.derivatives(0.5, 2);
+    /// assert_eq!(point, DVec3::new(0.75, 0.25, 0.0));
+    /// assert_eq!(velocity, DVec3::new(1.0, 1.0, 0.0));
+    /// assert_eq!(acceleration, DVec3::new(-2.0, 2.0, 0.0));
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
     #[must_use]
     pub fn derivatives(&self, t: f64, order: usize) -> [DVec3; MAX_DERIVATIVE + 1] {
         let basis = self.knots.basis(t, order);

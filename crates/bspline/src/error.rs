@@ -3,6 +3,19 @@
 use glam::DVec3;
 
 /// Why a curve or a surface was refused.
+///
+/// # Example
+/// ```
+/// use bspline::{BsplineCurve, Degree, KnotVector};
+/// use geom_core::DVec3;
+/// let knots = KnotVector::clamped_uniform(Degree::new(1)?, 2)?;
+/// let fault = BsplineCurve::new(knots, vec![DVec3::ZERO], None).unwrap_err();
+/// assert_eq!(
+///     fault.to_string(),
+///     "the knots need 2 control points, found 1; change the knots or the control points"
+/// );
+/// # Ok::<(), bspline::KnotError>(())
+/// ```
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 #[expect(missing_docs, reason = "the messages spell out every field")]

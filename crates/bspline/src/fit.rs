@@ -33,6 +33,9 @@ pub enum FitError {
          near it; spread the parameters or ask for fewer control points"
     )]
     Undetermined { direction: &'static str, index: usize },
+    /// Points without extent, too large, too small or too far away.
+    #[error(transparent)]
+    Size(#[from] geom_core::NormalizationError),
     /// The result is not a spline (data that is not finite).
     #[error(transparent)]
     Spline(#[from] SplineError),
@@ -43,6 +46,20 @@ pub enum FitError {
 ///
 /// # Errors
 /// [`FitError`] says which data are missing or at fault.
+///
+/// # Example
+/// ```
+/// use bspline::{Degree, KnotVector, fit_curve};
+/// use geom_core::DVec3;
+/// // Through as many points as there are control points.
+/// let knots = KnotVector::clamped_uniform(Degree::new(3)?, 6)?;
+/// let t = knots.greville_points();
+/// let points: Vec<DVec3> = t.iter().map(|t| DVec3::new(t.cos(), t.sin(), *t)).collect();
+/// let helix = fit_curve(&knots, &t, &points)?;
+/// assert!(helix.point(t[2]).distance(points[2]) < 1e-13);
+/// assert!(fit_curve(&knots, &t[1..], &points[1..]).is_err()); // one point too few
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 pub fn fit_curve(
     knots: &KnotVector,
     parameters: &[f64],
@@ -106,6 +123,19 @@ impl BsplineSurface {
     ///
     /// # Errors
     /// [`FitError`] if the new knots leave a control point without samples.
+    ///
+    /// # Example
+    /// ```
+    /// use bspline::{BsplineSurface, Degree, KnotVector};
+    /// use geom_core::DVec3;
+    /// let line = || KnotVector::clamped_uniform(Degree::new(1)?, 2);
+    /// let corners = vec![DVec3::ZERO, DVec3::Y, DVec3::X, DVec3::new(1.0, 1.0, 1.0)];
+    /// let saddle = BsplineSurface::new(line()?, line()?, corners, None)?; // z = x y
+    /// let finer = KnotVector::clamped_uniform(Degree::new(3)?, 6)?;
+    /// let refitted = saddle.refit(&finer, &finer)?;
+    /// assert!(refitted.point(0.3, 0.7).distance(DVec3::new(0.3, 0.7, 0.21)) < 1e-13);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
     pub fn refit(&self, knots_u: &KnotVector, knots_v: &KnotVector) -> Result<Self, FitError> {
         let u = knots_u.uniform_parameters(REFIT_SAMPLES * knots_u.control_count());
         let v = knots_v.uniform_parameters(REFIT_SAMPLES * knots_v.control_count());

@@ -3,12 +3,12 @@
 use crate::fit::{FitError, fit_surface};
 use crate::knots::{Degree, KnotVector};
 use crate::surface::BsplineSurface;
-use geom_core::BoundingBox;
+use geom_core::Normalization;
 use glam::DVec3;
 
 /// Control points grow by this factor until the tolerance is met.
 const GROWTH: f64 = 1.25;
-/// Default tolerance as a share of the bounding-box diagonal.
+/// Default tolerance as a share of the size of the points.
 const DEFAULT_TOLERANCE: f64 = 1e-3;
 /// Gauss-Newton steps of one foot point.
 const FOOT_STEPS: usize = 12;
@@ -20,8 +20,8 @@ pub struct GridFitOptions {
     pub degree: Option<Degree>,
     /// Numbers of control points; without, they grow until the tolerance is met.
     pub control_points: Option<(usize, usize)>,
-    /// Largest distance of a point to the surface, a length; without, 0.1 % of the bounding-box
-    /// diagonal of the points.
+    /// Largest distance of a point to the surface, a length; without, 0.1 % of the size of the points: the
+    /// diameter of the smallest ball around them.
     pub tolerance: Option<f64>,
 }
 
@@ -32,6 +32,8 @@ pub struct GridFit {
     pub surface: BsplineSurface,
     /// The tolerance that was asked for.
     pub tolerance: f64,
+    /// Size of the points: the diameter of the smallest ball around them.
+    pub size: f64,
     /// Largest distance of a point to its foot point on the surface.
     pub distance_max: f64,
     /// Mean distance.
@@ -70,8 +72,11 @@ pub fn fit_grid(
     options: &GridFitOptions,
 ) -> Result<GridFit, FitError> {
     assert_eq!(points.len(), n_u * n_v, "one point for each place of the grid");
-    let diagonal = BoundingBox::of(points.iter().copied()).map_or(0.0, BoundingBox::diagonal);
-    let tolerance = options.tolerance.unwrap_or(DEFAULT_TOLERANCE * diagonal);
+    // Near the origin nothing is lost to rounding.
+    let place = Normalization::of(points)?;
+    let centred: Vec<DVec3> = points.iter().map(|&p| p - place.center()).collect();
+    let points = &centred[..];
+    let tolerance = options.tolerance.unwrap_or(DEFAULT_TOLERANCE * place.size());
     // A closed direction of degree d needs d + 1 points, as an open one does.
     let most = n_u.min(n_v).saturating_sub(1).clamp(1, 4);
     let degree = match options.degree {
@@ -87,17 +92,18 @@ pub fn fit_grid(
         let u: Vec<f64> =
             u.iter().map(|t| if *t < start { t - start + 1.0 } else { t - start }).collect();
         let surface = fit_surface(&knots_u, &knots_v, &u, &v, points)?;
-        Ok(measured(surface, tolerance, &u, &v, points))
+        Ok(measured(surface, [tolerance, place.size()], &u, &v, points))
     };
+    let back = |fit: GridFit| GridFit { surface: fit.surface.translated(place.center()), ..fit };
     if let Some(counts) = options.control_points {
-        return fit(counts);
+        return fit(counts).map(back);
     }
     let least = |n: usize| (degree.order() + 1).min(n);
     let mut counts = (least(n_u), least(n_v));
     loop {
         let found = fit(counts)?;
         if found.distance_max <= tolerance || counts == (n_u, n_v) {
-            return Ok(found);
+            return Ok(back(found));
         }
         let grow = |count: usize, n: usize| ((count as f64 * GROWTH).ceil() as usize).min(n);
         counts = (grow(counts.0, n_u), grow(counts.1, n_v));
@@ -175,7 +181,7 @@ fn knots(
 
 fn measured(
     surface: BsplineSurface,
-    tolerance: f64,
+    [tolerance, size]: [f64; 2],
     u: &[f64],
     v: &[f64],
     points: &[DVec3],
@@ -188,6 +194,7 @@ fn measured(
     let count = distances.len().max(1) as f64;
     GridFit {
         tolerance,
+        size,
         distance_max: distances.iter().copied().fold(0.0, f64::max),
         distance_mean: distances.iter().sum::<f64>() / count,
         distance_rms: (distances.iter().map(|d| d * d).sum::<f64>() / count).sqrt(),
@@ -199,6 +206,19 @@ impl BsplineSurface {
     /// The foot point of `point` on the surface that is found from the parameters `start`, and its
     /// distance: Gauss-Newton steps that never increase the distance, within the domain. The
     /// distance is at most that of the start.
+    ///
+    /// # Example
+    /// ```
+    /// use bspline::{BsplineSurface, Degree, KnotVector};
+    /// use geom_core::DVec3;
+    /// let line = || KnotVector::clamped_uniform(Degree::new(1)?, 2);
+    /// let corners = vec![DVec3::ZERO, DVec3::Y, DVec3::X, DVec3::X + DVec3::Y];
+    /// let square = BsplineSurface::new(line()?, line()?, corners, None)?;
+    /// let ([u, v], distance) = square.foot_point(DVec3::new(0.25, 0.75, 2.0), [0.5, 0.5]);
+    /// assert!((u - 0.25).abs() < 1e-12 && (v - 0.75).abs() < 1e-12);
+    /// assert!((distance - 2.0).abs() < 1e-12);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
     #[must_use]
     pub fn foot_point(&self, point: DVec3, start: [f64; 2]) -> ([f64; 2], f64) {
         let [mut u, mut v] = start;

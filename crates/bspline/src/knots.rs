@@ -42,6 +42,17 @@ impl fmt::Display for Degree {
 }
 
 /// Why a knot vector was refused.
+///
+/// # Example
+/// ```
+/// use bspline::{Degree, KnotVector};
+/// let fault = KnotVector::new(Degree::new(1)?, vec![0.0, 0.0, 0.7, 0.4, 1.0, 1.0]).unwrap_err();
+/// assert_eq!(
+///     fault.to_string(),
+///     "knot 2 is 0.7 and the next 0.4; knots must be finite and sorted"
+/// );
+/// # Ok::<(), bspline::KnotError>(())
+/// ```
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 #[expect(missing_docs, reason = "the messages spell out every field")]
@@ -136,6 +147,14 @@ impl KnotVector {
     ///
     /// # Errors
     /// [`KnotError::TooFewControlPoints`] if `n` is below `degree + 1`.
+    ///
+    /// # Example
+    /// ```
+    /// use bspline::{Degree, KnotVector};
+    /// let knots = KnotVector::clamped_uniform(Degree::new(1)?, 3)?;
+    /// assert_eq!(knots.knots(), [0.0, 0.0, 0.5, 1.0, 1.0]);
+    /// # Ok::<(), bspline::KnotError>(())
+    /// ```
     pub fn clamped_uniform(degree: Degree, n: usize) -> Result<Self, KnotError> {
         let d = degree.get();
         if n < degree.order() {
@@ -154,6 +173,15 @@ impl KnotVector {
     /// # Errors
     /// [`KnotError`] names the first knot at fault; one period needs at least `degree + 1`
     /// control points, so that no basis function overlaps itself.
+    ///
+    /// # Example
+    /// ```
+    /// use bspline::{Degree, KnotVector};
+    /// let knots = KnotVector::periodic(Degree::new(2)?, &[0.0, 0.5, 1.0, 2.0])?;
+    /// assert_eq!((knots.control_count(), knots.domain()), (3, (0.0, 2.0)));
+    /// assert_eq!(knots.normalize(2.75), 0.75); // the next period
+    /// # Ok::<(), bspline::KnotError>(())
+    /// ```
     pub fn periodic(degree: Degree, period_knots: &[f64]) -> Result<Self, KnotError> {
         let d = degree.get();
         let n = period_knots.len().saturating_sub(1);
@@ -234,6 +262,15 @@ impl KnotVector {
 
     /// Knots of the domain without repetition, both ends included: the ends of the polynomial
     /// pieces.
+    ///
+    /// # Example
+    /// ```
+    /// use bspline::{Degree, KnotVector};
+    /// let knots = KnotVector::new(Degree::new(2)?, vec![0.0, 0.0, 0.0, 0.5, 0.5, 2.0, 2.0, 2.0])?;
+    /// assert_eq!(knots.breaks(), [0.0, 0.5, 2.0]);
+    /// assert_eq!((knots.domain(), knots.multiplicity(0.5)), ((0.0, 2.0), 2));
+    /// # Ok::<(), bspline::KnotError>(())
+    /// ```
     #[must_use]
     pub fn breaks(&self) -> Vec<f64> {
         let d = self.degree.get();
@@ -243,6 +280,14 @@ impl KnotVector {
     }
 
     /// Every different knot with the number of times it occurs, in rising order.
+    ///
+    /// # Example
+    /// ```
+    /// use bspline::{Degree, KnotVector};
+    /// let knots = KnotVector::clamped_uniform(Degree::new(2)?, 4)?;
+    /// assert_eq!(knots.multiplicities(), [(0.0, 3), (0.5, 1), (1.0, 3)]);
+    /// # Ok::<(), bspline::KnotError>(())
+    /// ```
     #[must_use]
     pub fn multiplicities(&self) -> Vec<(f64, usize)> {
         let mut result: Vec<(f64, usize)> = Vec::new();
@@ -278,6 +323,14 @@ impl KnotVector {
 
     /// Index `k` of the knot span `[t_k, t_{k+1})` of positive length that holds `t`, which must
     /// lie in the domain; the end of the domain belongs to the last span.
+    ///
+    /// # Example
+    /// ```
+    /// use bspline::{Degree, KnotVector};
+    /// let knots = KnotVector::clamped_uniform(Degree::new(2)?, 4)?; // 0 0 0 1/2 1 1 1
+    /// assert_eq!([0.25, 0.5, 1.0].map(|t| knots.span(t)), [2, 3, 3]);
+    /// # Ok::<(), bspline::KnotError>(())
+    /// ```
     #[must_use]
     pub fn span(&self, t: f64) -> usize {
         let d = self.degree.get();
@@ -302,6 +355,19 @@ impl KnotVector {
     ///
     /// Interpolation at them is well conditioned, and a straight line has its control points
     /// there. Those of a periodic knot vector are wrapped into the period, unsorted.
+    ///
+    /// # Example
+    /// ```
+    /// use bspline::{BsplineCurve, Degree, KnotVector};
+    /// use geom_core::DVec3;
+    /// let knots = KnotVector::clamped_uniform(Degree::new(2)?, 4)?;
+    /// assert_eq!(knots.greville_points(), [0.0, 0.25, 0.75, 1.0]);
+    /// // The graph of 3 t has its control points there.
+    /// let line = knots.greville_points().iter().map(|&t| DVec3::new(t, 3.0 * t, 0.0)).collect();
+    /// let line = BsplineCurve::new(knots, line, None)?;
+    /// assert!(line.point(0.4).distance(DVec3::new(0.4, 1.2, 0.0)) < 1e-15);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
     #[must_use]
     pub fn greville_points(&self) -> Vec<f64> {
         let d = self.degree.get();
@@ -315,6 +381,16 @@ impl KnotVector {
     }
 
     /// `count` parameters at equal distances over the domain; the end is left out if periodic.
+    ///
+    /// # Example
+    /// ```
+    /// use bspline::{Degree, KnotVector};
+    /// let knots = KnotVector::clamped_uniform(Degree::new(2)?, 5)?;
+    /// assert_eq!(knots.uniform_parameters(3), [0.0, 0.5, 1.0]);
+    /// let closed = KnotVector::periodic_uniform(Degree::new(2)?, 5)?;
+    /// assert_eq!(closed.uniform_parameters(2), [0.0, 0.5]);
+    /// # Ok::<(), bspline::KnotError>(())
+    /// ```
     #[must_use]
     pub fn uniform_parameters(&self, count: usize) -> Vec<f64> {
         let (start, end) = self.domain();

@@ -5,6 +5,7 @@
 //! are clamped to it, or wrapped where the direction is periodic.
 
 mod basis;
+mod check_grid;
 mod closest;
 mod conic;
 mod curve;
@@ -16,6 +17,7 @@ mod grid_fit;
 mod knots;
 mod lift;
 mod offset;
+mod quadrature;
 mod rational;
 mod refine;
 mod region;
@@ -25,8 +27,10 @@ mod surface;
 mod sweep;
 mod table;
 mod trim;
+mod trim_mesh;
 
 pub use basis::{BasisValues, MAX_DERIVATIVE};
+pub use check_grid::{Flaw, FlawKind, LEAST_AREA_RATIO};
 pub use closest::SurfaceLocator;
 pub use conic::ArcSpans;
 pub use curve::BsplineCurve;
@@ -44,3 +48,4 @@ pub use surface::BsplineSurface;
 pub use sweep::Axis;
 pub use table::{BasisTable, SampleGrid, SpanSamples};
 pub use trim::{Trim, TrimCurve, TrimError, TrimLoop};
+pub use trim_mesh::TrimMesh;

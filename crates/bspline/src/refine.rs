@@ -16,6 +16,15 @@ impl KnotVector {
     ///
     /// # Errors
     /// [`KnotError`] if a knot then occurs too often, or lies outside the domain.
+    ///
+    /// # Example
+    /// ```
+    /// use bspline::{Degree, KnotVector};
+    /// let knots = KnotVector::clamped_uniform(Degree::new(1)?, 2)?.with_knots(&[0.75, 0.25])?;
+    /// assert_eq!(knots.knots(), [0.0, 0.0, 0.25, 0.75, 1.0, 1.0]);
+    /// assert!(knots.with_knots(&[1.5]).is_err()); // outside the domain
+    /// # Ok::<(), bspline::KnotError>(())
+    /// ```
     pub fn with_knots(&self, added: &[f64]) -> Result<Self, KnotError> {
         let (start, end) = self.domain();
         if let Some(&value) = added.iter().find(|t| !(start..=end).contains(*t)) {
@@ -206,6 +215,21 @@ impl BsplineCurve {
     ///
     /// # Errors
     /// [`KnotError`], as a [`SplineError`], if a knot is outside the domain or repeated too often.
+    ///
+    /// # Example
+    /// ```
+    /// use bspline::{BsplineCurve, Degree, KnotVector};
+    /// use geom_core::DVec3;
+    /// // A parabola cut in two: the control polygon of both halves by de Casteljau's midpoints.
+    /// let knots = KnotVector::clamped_uniform(Degree::new(2)?, 3)?;
+    /// let points = vec![DVec3::ZERO, DVec3::X, DVec3::X + DVec3::Y];
+    /// let parabola = BsplineCurve::new(knots, points, None)?;
+    /// let halves = parabola.insert_knots(&[0.5, 0.5])?;
+    /// let middle = parabola.point(0.5);
+    /// let [_, left, cut, right, _] = halves.control_points() else { panic!("five points") };
+    /// assert_eq!((*left, *cut, *right), (0.5 * DVec3::X, middle, DVec3::new(1.0, 0.5, 0.0)));
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
     pub fn insert_knots(&self, added: &[f64]) -> Result<Self, SplineError> {
         self.expressed(&self.knots().with_knots(added)?)
     }
@@ -215,6 +239,9 @@ impl BsplineCurve {
     /// # Errors
     /// [`SplineError`] if the numbers of an extreme curve leave the range of `f64`.
     pub fn clamped(&self) -> Result<Self, SplineError> {
+        if self.knots().is_clamped() {
+            return Ok(self.clone());
+        }
         self.expressed(&self.knots().clamped())
     }
 
@@ -222,6 +249,17 @@ impl BsplineCurve {
     ///
     /// # Errors
     /// [`KnotError`], as a [`SplineError`], if `degree` is below the present one.
+    ///
+    /// # Example
+    /// ```
+    /// use bspline::{BsplineCurve, Degree, KnotVector};
+    /// use geom_core::DVec3;
+    /// let knots = KnotVector::clamped_uniform(Degree::new(1)?, 2)?;
+    /// let line = BsplineCurve::new(knots, vec![DVec3::ZERO, DVec3::X], None)?;
+    /// let parabola = line.elevated(Degree::new(2)?)?;
+    /// assert_eq!(parabola.control_points(), [DVec3::ZERO, 0.5 * DVec3::X, DVec3::X]);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
     pub fn elevated(&self, degree: Degree) -> Result<Self, SplineError> {
         self.expressed(&elevated_knots(self.knots(), degree)?)
     }
@@ -280,6 +318,9 @@ impl BsplineSurface {
     /// # Errors
     /// [`SplineError`] if the numbers of an extreme surface leave the range of `f64`.
     pub fn clamped(&self) -> Result<Self, SplineError> {
+        if self.knots_u().is_clamped() && self.knots_v().is_clamped() {
+            return Ok(self.clone());
+        }
         self.expressed(&self.knots_u().clamped(), &self.knots_v().clamped())
     }
 
@@ -297,6 +338,22 @@ impl BsplineSurface {
     ///
     /// # Errors
     /// [`SplineError`] if the numbers of an extreme surface leave the range of `f64`.
+    ///
+    /// # Example
+    /// ```
+    /// use bspline::{BsplineSurface, Degree, KnotVector};
+    /// use geom_core::DVec3;
+    /// // A folded strip: two flat pieces that meet at u = 1/2.
+    /// let u = KnotVector::clamped_uniform(Degree::new(1)?, 3)?;
+    /// let v = KnotVector::clamped_uniform(Degree::new(1)?, 2)?;
+    /// let fold = [DVec3::ZERO, DVec3::new(1.0, 0.0, 1.0), DVec3::new(2.0, 0.0, 0.0)];
+    /// let points = fold.iter().flat_map(|&p| [p, p + DVec3::Y]).collect();
+    /// let strip = BsplineSurface::new(u, v, points, None)?;
+    /// let pieces = strip.bezier_patches()?;
+    /// assert_eq!((pieces.len(), pieces[1].u), (2, [0.5, 1.0]));
+    /// assert_eq!(pieces[1].patch.point(0.0, 1.0), strip.point(0.5, 1.0));
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
     pub fn bezier_patches(&self) -> Result<Vec<BezierPiece>, SplineError> {
         let (d_u, d_v) = (self.degree_u(), self.degree_v());
         let target_u = self.knots_u().with_inner_multiplicity(d_u, |_| d_u.get());

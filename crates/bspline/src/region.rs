@@ -2,7 +2,7 @@
 
 use crate::curve::BsplineCurve;
 use crate::knots::KnotVector;
-use crate::statistics::{CELLS, GAUSS, add};
+use crate::quadrature::{CELLS, GAUSS, add};
 use crate::surface::BsplineSurface;
 use crate::trim::Trim;
 use geom_core::CurvatureStatistics;

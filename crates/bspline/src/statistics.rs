@@ -1,20 +1,10 @@
 //! Area and curvatures of a whole surface.
 
-use crate::knots::KnotVector;
+use crate::quadrature::{add, cells, ends, nodes, parameters};
+use crate::region::Region;
 use crate::surface::BsplineSurface;
-use geom_core::{CurvatureStatistics, SurfaceJet};
-use std::ops::Range;
-
-/// Nodes and weights of five-point Gauss-Legendre quadrature on `[0, 1]`, exact to degree 9.
-pub(crate) const GAUSS: [(f64, f64); 5] = [
-    (0.046_910_077_030_668, 0.118_463_442_528_094_54),
-    (0.230_765_344_947_158_46, 0.239_314_335_249_683_23),
-    (0.5, 0.284_444_444_444_444_44),
-    (0.769_234_655_052_841_5, 0.239_314_335_249_683_23),
-    (0.953_089_922_969_332, 0.118_463_442_528_094_54),
-];
-/// Knot spans are cut until a direction has at least this many cells.
-pub(crate) const CELLS: usize = 16;
+use crate::trim::Trim;
+use geom_core::{CurvatureStatistics, DVec3, SurfaceJet};
 
 impl BsplineSurface {
     /// Area and curvatures of the surface: area and means by Gauss quadrature with 5 x 5 nodes in
@@ -50,42 +40,37 @@ impl BsplineSurface {
         }
         statistics
     }
-}
 
-pub(crate) fn add(statistics: &mut CurvatureStatistics, jet: &SurfaceJet, weight: f64) {
-    match (jet.mean_curvature(), jet.gaussian_curvature()) {
-        (Ok(h), Ok(k)) => statistics.add(jet.position(), weight, h, k),
-        _ => statistics.add_singular(jet.position()),
+    /// The volume between the surface (or the part that `trim` bounds) and a point, by the same
+    /// quadrature: `∫ (S − apex) · (S_u × S_v) / 3 du dv`. Over all faces of a closed shell with
+    /// the normals outside the sum is its volume, whatever the point (Gauss's theorem).
+    ///
+    /// # Example
+    /// ```
+    /// use bspline::{Elementary, ElementaryKind, Frame};
+    /// use geom_core::DVec3;
+    /// let frame = Frame::new(DVec3::X, DVec3::Z, None);
+    /// let torus = Elementary { frame, kind: ElementaryKind::Torus { major: 3.0, minor: 1.0 } };
+    /// let turn = [0.0, std::f64::consts::TAU];
+    /// let volume = torus.surface(turn, turn)?.cone_volume(None, DVec3::ZERO);
+    /// assert!((volume - 6.0 * std::f64::consts::PI.powi(2)).abs() < 1e-9);
+    /// # Ok::<(), bspline::SplineError>(())
+    /// ```
+    #[must_use]
+    pub fn cone_volume(&self, trim: Option<&Trim>, apex: DVec3) -> f64 {
+        let share =
+            |jet: &SurfaceJet| (jet.position() - apex).dot(jet.d(1, 0).cross(jet.d(0, 1))) / 3.0;
+        if let Some(trim) = trim {
+            let nodes = Region::new(trim, self).nodes();
+            let places: Vec<[f64; 2]> = nodes.iter().map(|n| n.at).collect();
+            let jets = self.jets(&places, 1);
+            return jets.iter().zip(&nodes).map(|(jet, node)| node.weight * share(jet)).sum();
+        }
+        let (nodes_u, nodes_v) = (nodes(&cells(self.knots_u())), nodes(&cells(self.knots_v())));
+        let jets = self.jet_grid(&parameters(&nodes_u), &parameters(&nodes_v), 1);
+        let weight = |k: usize| nodes_u[k / nodes_v.len()].1 * nodes_v[k % nodes_v.len()].1;
+        jets.iter().enumerate().map(|(k, jet)| weight(k) * share(jet)).sum()
     }
-}
-
-fn cells(knots: &KnotVector) -> Vec<Range<f64>> {
-    let breaks = knots.breaks();
-    let pieces = CELLS.div_ceil(breaks.len() - 1);
-    let cut = |pair: &[f64]| {
-        let (a, b) = (pair[0], pair[1]);
-        let at =
-            move |i: usize| if i == pieces { b } else { a + (b - a) * i as f64 / pieces as f64 };
-        (0..pieces).map(move |i| at(i)..at(i + 1))
-    };
-    breaks.windows(2).flat_map(cut).collect()
-}
-
-fn nodes(cells: &[Range<f64>]) -> Vec<(f64, f64)> {
-    let of = |cell: &Range<f64>| {
-        let (start, length) = (cell.start, cell.end - cell.start);
-        GAUSS.map(|(x, w)| (start + length * x, length * w))
-    };
-    cells.iter().flat_map(of).collect()
-}
-
-fn parameters(nodes: &[(f64, f64)]) -> Vec<f64> {
-    nodes.iter().map(|(t, _)| *t).collect()
-}
-
-fn ends(cells: &[Range<f64>]) -> Vec<f64> {
-    let starts = cells.iter().map(|cell| cell.start);
-    starts.chain(cells.last().map(|cell| cell.end)).collect()
 }
 
 #[cfg(test)]

@@ -118,6 +118,17 @@ impl BsplineSurface {
     }
 
     /// The point at `(u, v)`.
+    ///
+    /// # Example
+    /// ```
+    /// use bspline::{BsplineSurface, Degree, KnotVector};
+    /// use geom_core::DVec3;
+    /// let knots = KnotVector::clamped_uniform(Degree::new(1)?, 2)?;
+    /// let corners = vec![DVec3::ZERO, DVec3::Y, DVec3::X, DVec3::new(1.0, 1.0, 4.0)];
+    /// let saddle = BsplineSurface::new(knots.clone(), knots, corners, None)?;
+    /// assert_eq!(saddle.point(0.5, 0.5), DVec3::new(0.5, 0.5, 1.0));
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
     #[must_use]
     pub fn point(&self, u: f64, v: f64) -> DVec3 {
         self.jet(u, v, 0).position()
@@ -146,6 +157,20 @@ impl BsplineSurface {
     ///
     /// # Panics
     /// If `order` exceeds [`MAX_DERIVATIVE`].
+    ///
+    /// # Example
+    /// ```
+    /// use bspline::{BsplineSurface, Degree, KnotVector};
+    /// use geom_core::DVec3;
+    /// let line = || KnotVector::clamped_uniform(Degree::new(1)?, 2);
+    /// let corners = vec![DVec3::ZERO, DVec3::Y, DVec3::X, DVec3::new(1.0, 1.0, 1.0)];
+    /// let saddle = BsplineSurface::new(line()?, line()?, corners, None)?; // z = x y
+    /// let jets = saddle.jet_grid(&[0.0, 1.0], &[0.0, 0.5, 1.0], 2);
+    /// // K = −1 / (1 + x² + y²)²; the last corner is (1, 1).
+    /// assert_eq!(jets.len(), 6);
+    /// assert!((jets[5].gaussian_curvature()? + 1.0 / 9.0).abs() < 1e-15);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
     #[must_use]
     pub fn jet_grid(&self, u: &[f64], v: &[f64], order: usize) -> Vec<SurfaceJet> {
         let basis_v: Vec<BasisValues> = v.iter().map(|&t| self.knots_v.basis(t, order)).collect();

@@ -148,6 +148,21 @@ impl BasisTable {
 
 /// A sample grid over a tensor-product surface: all pairs of the samples of two tables, sample
 /// `i * v.len() + j`.
+///
+/// # Example
+/// ```
+/// use bspline::{BsplineSurface, Degree, KnotVector, SampleGrid};
+/// use geom_core::DVec3;
+/// let line = || KnotVector::clamped_uniform(Degree::new(1)?, 2);
+/// let corners = vec![DVec3::ZERO, DVec3::Y, DVec3::X, DVec3::new(1.0, 1.0, 1.0)];
+/// let saddle = BsplineSurface::new(line()?, line()?, corners, None)?; // z = x y
+/// // Made once, applied to the control points of every iterate.
+/// let samples = SampleGrid::new(&saddle, &[0.25, 0.5], &[0.0, 0.5, 1.0], 2);
+/// let jets = samples.jets(saddle.control_points(), 2);
+/// assert_eq!(jets[3 + 1].position(), DVec3::new(0.5, 0.5, 0.25));
+/// assert_eq!(jets[3 + 1].d(1, 1), DVec3::Z);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Clone, Debug, PartialEq)]
 pub struct SampleGrid {
     /// Basis functions in u.

@@ -2,6 +2,7 @@
 //! whose feature is not there is an unknown flag.
 
 use crate::failure::Failure;
+use crate::outcome::Outcome;
 use crate::paths::STDOUT;
 use std::num::NonZeroUsize;
 use std::path::{Path, PathBuf};
@@ -15,6 +16,10 @@ pub(crate) struct GlobalArgs {
     /// Number of threads (default: one per core); results do not depend on it
     #[arg(long, value_name = "N", global = true)]
     pub(crate) threads: Option<NonZeroUsize>,
+    /// Read the input as this format (ron, step, 3dm, obj, ply, off, stl, glb, json), whatever its
+    /// name and content say; an input `-` is standard input
+    #[arg(long, value_name = "FORMAT", global = true)]
+    pub(crate) input_format: Option<String>,
     /// Print no summary and no progress
     #[arg(short, long, global = true)]
     pub(crate) quiet: bool,
@@ -80,17 +85,6 @@ pub(crate) struct ConfigArgs {
     pub(crate) config: Option<PathBuf>,
 }
 
-/// `--checkpoint` and `--resume`, for solvers that can be continued.
-#[derive(Debug, clap::Args)]
-pub(crate) struct CheckpointArgs {
-    /// Write the state of the solver here when it ends or is interrupted
-    #[arg(long, value_name = "FILE")]
-    pub(crate) checkpoint: Option<PathBuf>,
-    /// Continue from a checkpoint
-    #[arg(long, value_name = "FILE")]
-    pub(crate) resume: Option<PathBuf>,
-}
-
 /// `--dump-system`, for methods that linearise.
 #[derive(Debug, clap::Args)]
 pub(crate) struct SystemArgs {
@@ -100,12 +94,23 @@ pub(crate) struct SystemArgs {
     pub(crate) dump_system: Option<PathBuf>,
 }
 
-/// `--require-converged`, for iterative commands.
+/// What is to become of results that are not as wished, for iterative commands.
 #[derive(Debug, clap::Args)]
-pub(crate) struct ConvergedArgs {
+pub(crate) struct EndingArgs {
     /// Exit with code 3 unless the status is `converged`
     #[arg(long)]
-    pub(crate) require_converged: bool,
+    require_converged: bool,
+    /// Write the model files of a result with the status `failed` too
+    #[arg(long)]
+    keep_failed: bool,
+}
+
+impl EndingArgs {
+    /// Tells the outcome.
+    pub(crate) fn apply(&self, outcome: &mut Outcome) {
+        outcome.require_converged = self.require_converged;
+        outcome.keep_failed = self.keep_failed;
+    }
 }
 
 /// Whether a file could be written at `path`: its folder is there and takes files.

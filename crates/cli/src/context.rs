@@ -1,22 +1,22 @@
-//! What every command is given: verbosity, threads, the interrupt flag, a progress bar.
+//! What every command is given: verbosity, threads, Ctrl-C, a progress bar.
 
 use crate::args::GlobalArgs;
-use crate::failure::{Failure, INTERRUPTED};
+use crate::failure::Failure;
+use crate::interrupt::Interrupt;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use std::io::IsTerminal;
 use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
 
 /// Set up once, before the command runs.
 #[derive(Debug)]
 pub(crate) struct Context {
     /// Threads of the global rayon pool.
     pub(crate) threads: usize,
+    /// Ctrl-C.
+    pub(crate) interrupt: Arc<Interrupt>,
+    /// The format of the input, if it is said.
+    pub(crate) input_format: Option<String>,
     quiet: bool,
-    interrupt: Arc<AtomicBool>,
-    /// Whether somebody will act on the interrupt flag: a solver that asks for it between steps,
-    /// or `main` while it writes.
-    heeded: Arc<AtomicBool>,
 }
 
 impl Context {
@@ -28,31 +28,9 @@ impl Context {
             pool = pool.num_threads(threads.get());
         }
         pool.build_global().map_err(|e| Failure::other(format!("cannot start threads: {e}")))?;
-        let interrupt = Arc::new(AtomicBool::new(false));
-        let heeded = Arc::new(AtomicBool::new(false));
-        let (flag, listener) = (Arc::clone(&interrupt), Arc::clone(&heeded));
-        // The first Ctrl-C asks the solver to stop and write its checkpoint, the second one ends;
-        // so does the first one where no solver has begun to ask, for nothing is written yet.
-        let handler = move || {
-            if flag.swap(true, Ordering::SeqCst) || !listener.load(Ordering::SeqCst) {
-                std::process::exit(i32::from(INTERRUPTED));
-            }
-        };
-        ctrlc::set_handler(handler)
-            .map_err(|e| Failure::other(format!("cannot listen for Ctrl-C: {e}")))?;
-        Ok(Self { threads: rayon::current_num_threads(), quiet: global.quiet, interrupt, heeded })
-    }
-
-    /// Whether the user pressed Ctrl-C: the callback of every solver asks.
-    pub(crate) fn interrupted(&self) -> bool {
-        self.heeded.store(true, Ordering::SeqCst);
-        self.interrupt.load(Ordering::SeqCst)
-    }
-
-    /// From here on Ctrl-C waits until the files are written, which takes a moment only; then no
-    /// temporary file is left behind.
-    pub(crate) fn begin_writing(&self) {
-        self.heeded.store(true, Ordering::SeqCst);
+        let interrupt = Interrupt::listen()?;
+        let (threads, input_format) = (rayon::current_num_threads(), global.input_format.clone());
+        Ok(Self { threads, interrupt, input_format, quiet: global.quiet })
     }
 
     /// A progress bar of `steps` steps on stderr; invisible unless stderr is a terminal.

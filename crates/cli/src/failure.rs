@@ -1,6 +1,7 @@
 //! Why a command could not give a result, and the exit code that says so.
 
 use std::fmt;
+use std::io::Write;
 use std::path::Path;
 
 /// A result was written.
@@ -11,6 +12,8 @@ pub(crate) const DEFECT: u8 = 1;
 pub(crate) const USAGE: u8 = 2;
 /// `--require-converged` and another status.
 pub(crate) const NOT_CONVERGED: u8 = 3;
+/// The result is no use where it was looked at more closely.
+pub(crate) const FAILED: u8 = 4;
 /// Ctrl-C.
 pub(crate) const INTERRUPTED: u8 = 130;
 
@@ -53,4 +56,9 @@ impl fmt::Display for Failure {
 /// A view that was refused is a slip of ours, not of the user.
 pub(crate) fn refused(error: report::ReportError) -> Failure {
     Failure::other(format!("cannot draw the result: {error}"))
+}
+
+/// One line on stderr, in the name of the program.
+pub(crate) fn say(message: &str) {
+    let _ = writeln!(std::io::stderr().lock(), "umbilic: {message}");
 }

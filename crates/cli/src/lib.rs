@@ -5,10 +5,13 @@
 #![allow(clippy::print_stdout, reason = "a command line tool prints")]
 
 mod args;
+mod checkpoints;
 mod commands;
 mod config;
 mod context;
 mod failure;
+mod input_file;
+mod interrupt;
 mod limits;
 mod net_files;
 mod net_report;
@@ -18,13 +21,12 @@ mod panel_files;
 mod paths;
 mod report_support;
 mod stdout;
-mod surface_file;
 mod watch;
 mod written;
 
 use clap::{CommandFactory, FromArgMatches, Parser};
 use context::Context;
-use failure::{DEFECT, Failure, INTERRUPTED, NOT_CONVERGED, OK, USAGE};
+use failure::{DEFECT, FAILED, Failure, INTERRUPTED, NOT_CONVERGED, OK, USAGE, say};
 use outcome::{Outcome, Status};
 use paths::Paths;
 use std::io::Write;
@@ -102,19 +104,43 @@ fn run(
     if let Some(path) = &global.metrics {
         args::check_output_path(path)?;
     }
-    let name = command.name();
+    context.interrupt.begin(interrupt::Run {
+        command: command.name(),
+        begin,
+        threads: context.threads,
+        metrics: global.metrics.clone(),
+        quiet: global.quiet,
+    });
     let outcome = command.run(context)?;
-    paths.check_results(&outcome)?;
+    write(outcome, paths, &context.interrupt, global.quiet)
+}
+
+/// Writes and prints what a command has found, or what there is of it after Ctrl-C.
+fn write(
+    mut outcome: Outcome,
+    paths: &Paths,
+    interrupt: &interrupt::Interrupt,
+    quiet: bool,
+) -> Result<u8, Failure> {
+    // From here on this thread ends the program.
+    let desk = interrupt.desk();
+    outcome.checkpoint = desk.checkpoint();
+    outcome.warnings.extend(desk.trouble().map(|t| format!("no checkpoint on the way: {t}")));
     for warning in &outcome.warnings {
         say(&format!("warning: {warning}"));
     }
-    let metrics = global.metrics.as_ref().map(|path| {
-        (path.clone(), outcome.metrics_file(name, begin.elapsed().as_secs_f64(), context.threads))
-    });
-    context.begin_writing();
+    if interrupt.is_wanted() {
+        outcome.status = Status::Interrupted;
+    }
+    paths.check_results(&outcome)?;
     paths.make_folders(&outcome)?;
-    outcome.write_files(metrics)?;
-    if !global.quiet {
+    let is_over = outcome.status == Status::Interrupted;
+    let is_stopped = || !is_over && interrupt.is_wanted();
+    if !outcome.write_files(desk.metrics_of(&outcome), &is_stopped)? {
+        outcome.status = Status::Interrupted;
+        outcome.write_files(desk.metrics_of(&outcome), &|| false)?;
+    }
+    if !quiet {
         let summary: String = outcome.summary.iter().map(|line| format!("{line}\n")).collect();
         if paths.use_stdout() {
             // Standard output holds a result; people read the rest beside it.
@@ -123,6 +149,11 @@ fn run(
             stdout::write(summary.as_bytes())?;
         }
     }
+    if outcome.status == Status::Interrupted {
+        desk.part(&outcome);
+    }
+    // Never given back: nobody is to end the program after this.
+    std::mem::forget(desk);
     Ok(exit_code(&outcome))
 }
 
@@ -131,12 +162,8 @@ fn exit_code(outcome: &Outcome) -> u8 {
         _ if outcome.differs => DEFECT,
         Status::Interrupted => INTERRUPTED,
         Status::Converged => OK,
+        Status::Failed => FAILED,
         _ if outcome.require_converged => NOT_CONVERGED,
         _ => OK,
     }
-}
-
-/// One line on stderr, in the name of the program.
-fn say(message: &str) {
-    let _ = writeln!(std::io::stderr().lock(), "umbilic: {message}");
 }

@@ -1,14 +1,16 @@
 //! Quad nets in and hyperbolic nets out, for the commands that work on them.
 
+use crate::context::Context;
 use crate::failure::Failure;
+use crate::input_file::{self, PartArgs, SurfaceArgs};
 use exchange::{Field, LengthUnit, Mesh, Model, NamedSurface, Net, Segment};
 use geom_core::{DVec3, PolyMesh};
 use hyperbolic_nets::{HyperbolicNet, PatchJet, QuadNet, SampledPatches};
 use std::path::{Path, PathBuf};
 
 /// Formats of the commands on nets.
-pub(crate) const NET_OUTPUTS: [&str; 9] =
-    ["ron", "step", "stp", "obj", "glb", "ply", "stl", "csv", "dxf"];
+pub(crate) const NET_OUTPUTS: [&str; 10] =
+    ["ron", "step", "stp", "3dm", "obj", "glb", "ply", "stl", "csv", "dxf"];
 
 /// What an input holds.
 pub(crate) enum NetInput {
@@ -18,10 +20,21 @@ pub(crate) enum NetInput {
     Mesh(PolyMesh),
 }
 
-/// Reads a net file (`.ron`) or the one mesh of a file.
-pub(crate) fn read(path: &Path) -> Result<(NetInput, LengthUnit, Vec<String>), Failure> {
+/// Reads a net file (`.ron`) or the one chosen mesh of a file.
+pub(crate) fn read(
+    context: &Context,
+    path: &Path,
+    part: &PartArgs,
+) -> Result<(NetInput, LengthUnit, Vec<String>), Failure> {
     let refused = |e: &dyn std::fmt::Display| Failure::input(path, e);
-    if exchange::extension_of(path) == "ron" {
+    let is_net = match context.input_format.as_deref() {
+        Some(format) => format == "ron",
+        None => exchange::extension_of(path) == "ron",
+    };
+    if is_net {
+        if !part.part.is_empty() {
+            return Err(Failure::usage("--part has no meaning for a net file; leave it out"));
+        }
         let text = exchange::read_text(path).map_err(|e| refused(&e))?;
         let net = exchange::read_net(&text).map_err(|e| refused(&e))?;
         let mesh = net.to_poly_mesh().map_err(|e| refused(&e))?;
@@ -37,20 +50,21 @@ pub(crate) fn read(path: &Path) -> Result<(NetInput, LengthUnit, Vec<String>), F
             HyperbolicNet::new(quads, normals, net.shape_parameters).map_err(|e| refused(&e))?;
         return Ok((NetInput::Net(Box::new(surface)), net.unit, Vec::new()));
     }
-    let (mesh, unit, warnings) = read_mesh(path)?;
+    let (mesh, unit, warnings) = read_mesh(Some(context), path, part)?;
     Ok((NetInput::Mesh(mesh), unit, warnings))
 }
 
-/// Reads the one mesh of a file.
-pub(crate) fn read_mesh(path: &Path) -> Result<(PolyMesh, LengthUnit, Vec<String>), Failure> {
-    let model = exchange::read_model(path).map_err(|e| Failure::input(path, e))?;
-    let mut with_faces = model.meshes.iter().filter(|m| !m.faces.is_empty());
-    let (Some(mesh), None) = (with_faces.next(), with_faces.next()) else {
-        return Err(Failure::input(
-            path,
-            "the file must hold one mesh with faces, no more and no less",
-        ));
+/// Reads the one chosen mesh of the input, or of another file without a context.
+pub(crate) fn read_mesh(
+    context: Option<&Context>,
+    path: &Path,
+    part: &PartArgs,
+) -> Result<(PolyMesh, LengthUnit, Vec<String>), Failure> {
+    let model = match context {
+        Some(context) => input_file::read(context, path, &SurfaceArgs::default(), part)?,
+        None => exchange::read_model(path).map_err(|e| Failure::input(path, e))?,
     };
+    let mesh = input_file::only_mesh(path, &model)?;
     let mesh = mesh.to_poly_mesh().map_err(|e| Failure::input(path, e))?;
     Ok((mesh, model.unit, model.warnings))
 }
@@ -89,11 +103,11 @@ pub(crate) fn encode(
         "ron" => exchange::write_net(&net_file(surface, unit))
             .map(String::into_bytes)
             .map_err(Failure::other),
-        "step" | "stp" => {
+        "step" | "stp" | "3dm" => {
             let mut surfaces = Vec::with_capacity(surface.shape().len());
             for (face, patch) in surface.patches().map_err(Failure::other)?.iter().enumerate() {
                 let surface = patch.to_surface().map_err(Failure::other)?;
-                surfaces.push(NamedSurface { name: format!("panel {face}"), surface });
+                surfaces.push(NamedSurface::new(format!("panel {face}"), surface));
             }
             write(&Model { unit: unit.clone(), surfaces, ..Model::default() })
         }

@@ -3,6 +3,7 @@
 use crate::failure::Failure;
 use crate::paths::{STDOUT, twice};
 use crate::stdout;
+use exchange::Model;
 use serde::Serialize;
 use std::path::{Path, PathBuf};
 
@@ -19,6 +20,8 @@ pub(crate) struct Outcome {
     pub(crate) input: Option<PathBuf>,
     /// Result files with their bytes, `-o` outputs first.
     pub(crate) files: Vec<(PathBuf, Vec<u8>)>,
+    /// Report, figures and systems, which are written of a failed result too.
+    pub(crate) pages: Vec<(PathBuf, Vec<u8>)>,
     /// The checkpoint, the only file besides the metrics that an interrupted run writes.
     pub(crate) checkpoint: Option<(PathBuf, Vec<u8>)>,
     /// The `metrics` object, keys as documented.
@@ -29,6 +32,8 @@ pub(crate) struct Outcome {
     pub(crate) warnings: Vec<String>,
     /// Whether another status than `converged` exits with code 3.
     pub(crate) require_converged: bool,
+    /// Whether the files of a failed result are written.
+    pub(crate) keep_failed: bool,
     /// Whether a file is not what a run says of it, which exits with code 1.
     pub(crate) differs: bool,
 }
@@ -41,11 +46,13 @@ impl Outcome {
             iterations,
             input: None,
             files: Vec::new(),
+            pages: Vec::new(),
             checkpoint: None,
             metrics: serde_json::json!({}),
             summary: Vec::new(),
             warnings: Vec::new(),
             require_converged: false,
+            keep_failed: false,
             differs: false,
         }
     }
@@ -60,6 +67,18 @@ impl Outcome {
     pub(crate) fn with_metrics<T: Serialize>(mut self, metrics: &T) -> Result<Self, Failure> {
         self.metrics = serde_json::to_value(metrics).map_err(Failure::other)?;
         Ok(self)
+    }
+
+    /// Adds a file with this content; the extension chooses the format.
+    pub(crate) fn add_model(&mut self, path: PathBuf, model: &Model) -> Result<(), Failure> {
+        let bytes = exchange::encode_model(&path, model).map_err(|e| Failure::input(&path, e))?;
+        if let Some(lost) = model.unit.lost_in(&exchange::extension_of(&path))
+            && !self.warnings.contains(&lost)
+        {
+            self.warnings.push(lost);
+        }
+        self.files.push((path, bytes));
+        Ok(())
     }
 
     /// The bytes of the metrics file.
@@ -81,8 +100,13 @@ impl Outcome {
         bytes
     }
 
-    /// Writes all files, or none of them; then what goes to standard output.
-    pub(crate) fn write_files(&self, metrics: Option<(PathBuf, Vec<u8>)>) -> Result<(), Failure> {
+    /// Writes all files, or none of them if `is_stopped` says so meanwhile; then what goes to
+    /// standard output. Returns whether they were written.
+    pub(crate) fn write_files(
+        &self,
+        metrics: Option<(PathBuf, Vec<u8>)>,
+        is_stopped: &dyn Fn() -> bool,
+    ) -> Result<bool, Failure> {
         let (streams, files): (Vec<_>, Vec<_>) = self
             .written()
             .chain(metrics.as_ref())
@@ -94,13 +118,22 @@ impl Outcome {
                 return Err(twice(path, other));
             }
         }
-        exchange::write_files(&files).map_err(Failure::usage)?;
-        streams.iter().try_for_each(|(_, bytes)| stdout::write(bytes))
+        if !exchange::write_files_unless(&files, is_stopped).map_err(Failure::usage)? {
+            return Ok(false);
+        }
+        streams.iter().try_for_each(|(_, bytes)| stdout::write(bytes))?;
+        Ok(true)
     }
 
-    fn written(&self) -> impl Iterator<Item = &(PathBuf, Vec<u8>)> {
-        let results = if self.status == Status::Interrupted { &[][..] } else { &self.files };
-        results.iter().chain(&self.checkpoint)
+    /// What is written of a result with this status.
+    pub(crate) fn written(&self) -> impl Iterator<Item = &(PathBuf, Vec<u8>)> {
+        let nothing: &[(PathBuf, Vec<u8>)] = &[];
+        let (files, pages) = match self.status {
+            Status::Interrupted => (nothing, nothing),
+            Status::Failed if !self.keep_failed => (nothing, &self.pages[..]),
+            _ => (&self.files[..], &self.pages[..]),
+        };
+        files.iter().chain(pages).chain(&self.checkpoint)
     }
 }
 

@@ -15,8 +15,8 @@ struct PanelingFile<'a> {
 }
 
 /// File extensions a paneling can be written as.
-pub(crate) const PANEL_OUTPUTS: [&str; 8] =
-    ["glb", "obj", "csv", "ron", "step", "stp", "svg", "dxf"];
+pub(crate) const PANEL_OUTPUTS: [&str; 9] =
+    ["glb", "obj", "csv", "ron", "step", "stp", "3dm", "svg", "dxf"];
 
 /// The files of an output `path`: panels, their table, molds, or flat outlines, by its extension,
 /// and beside the panels of an OBJ file the colours of their molds. `sheet` is width and height of
@@ -52,12 +52,17 @@ fn encode_one(
             let file = PanelingFile { molds: &paneling.molds, panels: &paneling.table(set) };
             exchange::to_ron(&file).map(String::into_bytes).map_err(Failure::other)
         }
-        "step" | "stp" => {
+        kind @ ("step" | "stp" | "3dm") => {
             let mut model = Model { unit: unit.clone(), ..Model::default() };
             for (m, mold) in paneling.molds.iter().enumerate() {
                 let surface = paneling.mold_surface(set, m).map_err(Failure::other)?;
                 let name = mold_name(m, mold);
-                model.surfaces.push(NamedSurface { name, surface });
+                let named = NamedSurface::new(name.clone(), surface);
+                model.surfaces.push(NamedSurface { layer: name, ..named });
+            }
+            if kind == "3dm" {
+                // Every mold and its panels stand on one layer.
+                model.meshes.push(panels_mesh(set, paneling));
             }
             exchange::encode_model(path, &model).map_err(|e| Failure::input(path, e))
         }

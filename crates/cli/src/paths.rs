@@ -83,7 +83,7 @@ impl Paths {
 
     /// As [`Self::check`], of everything that is about to be written.
     pub(crate) fn check_results(&self, outcome: &Outcome) -> Result<(), Failure> {
-        for (path, _) in &outcome.files {
+        for (path, _) in outcome.files.iter().chain(&outcome.pages) {
             self.check_input(false, path)?;
         }
         Ok(())
@@ -119,7 +119,7 @@ impl Paths {
     /// Makes the folders that options name, if anything is to be written to them.
     pub(crate) fn make_folders(&self, outcome: &Outcome) -> Result<(), Failure> {
         for folder in &self.folders {
-            if outcome.files.iter().any(|(path, _)| path.starts_with(folder)) {
+            if outcome.written().any(|(path, _)| path.starts_with(folder)) {
                 exchange::make_folder(folder).map_err(|e| Failure::input(folder, e))?;
             }
         }

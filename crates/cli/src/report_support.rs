@@ -52,8 +52,13 @@ pub(crate) fn add_model(report: &mut Report, model: &Model) -> Result<(), Failur
         let name = if mesh.name.is_empty() { "mesh" } else { &mesh.name };
         report.stages.push(mesh_view(name, mesh, &report.length_unit)?);
     }
-    if !model.surfaces.is_empty() {
-        let surfaces: Vec<_> = model.surfaces.iter().map(|s| &s.surface).collect();
+    let (trimmed, whole): (Vec<_>, Vec<_>) = model.surfaces.iter().partition(|s| s.trim.is_some());
+    if !trimmed.is_empty() {
+        let mesh = exchange::joined_mesh("trimmed faces", trimmed);
+        report.stages.push(mesh_view(&mesh.name, &mesh, &report.length_unit)?);
+    }
+    if !whole.is_empty() {
+        let surfaces: Vec<_> = whole.iter().map(|s| &s.surface).collect();
         let name = if surfaces.len() == 1 { "surface" } else { "surfaces" };
         report.stages.push(spline_view(name, &surfaces, None, &report.length_unit)?);
     }
@@ -85,11 +90,11 @@ pub(crate) fn add_files(
     }
     report.run.insert("threads".to_owned(), context.threads.into());
     if let Some(path) = &args.report {
-        outcome.files.push((path.clone(), report.to_html().into_bytes()));
+        outcome.pages.push((path.clone(), report.to_html().into_bytes()));
     }
     if let Some(folder) = &args.figures {
         for figure in report.figures().map_err(Failure::other)? {
-            outcome.files.push((folder.join(figure.name), figure.bytes));
+            outcome.pages.push((folder.join(figure.name), figure.bytes));
         }
     }
     Ok(())

@@ -4,23 +4,25 @@
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 
-use gp_solver::{Checkpoint, Observer, Progress};
+use gp_solver::{Checkpoint, Observer, Progress, SolverError};
 
-use crate::args::{CheckpointArgs, check_output_folder, check_output_path};
+use crate::args::check_output_folder;
+use crate::checkpoints::{CheckpointArgs, Resumed};
 use crate::context::{self, Context};
 use crate::failure::Failure;
-use crate::outcome::Outcome;
+use crate::outcome::{Outcome, Status};
 
 /// Steps of the progress bar: the share of the run that is done, in thousandths.
 const BAR: usize = 1000;
 
-/// Watches a run for the command line.
+/// Watches a run for the command line. While there is one, Ctrl-C gives solvers time to end by
+/// themselves.
 pub(crate) struct Watch<'c> {
     context: &'c Context,
     bar: context::Progress,
-    keep: Option<PathBuf>,
-    state: Option<Checkpoint>,
-    resume: Option<Checkpoint>,
+    input: Option<PathBuf>,
+    is_kept: bool,
+    resumed: Option<Resumed>,
     dump: Option<PathBuf>,
     systems: Vec<(PathBuf, Vec<u8>)>,
 }
@@ -32,21 +34,27 @@ impl<'c> Watch<'c> {
         Self {
             context,
             bar,
-            keep: None,
-            state: None,
-            resume: None,
+            input: None,
+            is_kept: false,
+            resumed: None,
             dump: None,
             systems: Vec::new(),
         }
     }
 
+    /// Names the main input, for the metrics of a run that is ended early.
+    pub(crate) fn of(mut self, input: &Path) -> Self {
+        self.input = Some(input.to_path_buf());
+        self.context.interrupt.open(Some(input), None);
+        self
+    }
+
     /// Keeps and resumes checkpoints as asked for.
     pub(crate) fn with_checkpoints(mut self, args: &CheckpointArgs) -> Result<Self, Failure> {
-        if let Some(path) = &args.checkpoint {
-            check_output_path(path)?;
-        }
-        self.keep.clone_from(&args.checkpoint);
-        self.resume = args.resume.as_deref().map(read_checkpoint).transpose()?;
+        let (kept, resumed) = args.open()?;
+        self.is_kept = kept.is_some();
+        self.resumed = resumed;
+        self.context.interrupt.open(self.input.as_deref(), kept);
         Ok(self)
     }
 
@@ -59,14 +67,19 @@ impl<'c> Watch<'c> {
         Ok(self)
     }
 
-    /// Hands the last checkpoint and the systems to the outcome.
-    pub(crate) fn finish(self, outcome: &mut Outcome) -> Result<(), Failure> {
-        outcome.files.extend(self.systems);
-        if let (Some(path), Some(state)) = (self.keep, self.state) {
-            let bytes = serde_json::to_vec(&state).map_err(Failure::other)?;
-            outcome.checkpoint = Some((path, bytes));
+    /// What a solver says of the checkpoint it was to go on from.
+    pub(crate) fn foreign(&self, error: &SolverError) -> Failure {
+        match &self.resumed {
+            Some(resumed) => resumed.refused(error),
+            None => Failure::other(error),
         }
-        Ok(())
+    }
+
+    /// The solver has ended: hands the systems to the outcome. Returns whether it ran to its end, so
+    /// that there are files to make.
+    pub(crate) fn finish(mut self, outcome: &mut Outcome) -> bool {
+        outcome.pages.append(&mut self.systems);
+        outcome.status != Status::Interrupted
     }
 
     fn dump(&mut self, progress: &Progress<'_>) {
@@ -87,28 +100,29 @@ impl Observer for Watch<'_> {
         self.bar.at(done, format!("{}: energy {:.3e}", progress.stage.name, progress.energy));
         if progress.iteration == 0 {
             self.dump(progress);
+        } else {
+            self.context.interrupt.count();
         }
-        if self.context.interrupted() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+        if self.stop_requested() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
     }
 
     fn stop_requested(&mut self) -> bool {
-        self.context.interrupted()
+        self.context.interrupt.is_wanted_by_solver()
     }
 
     fn checkpoint(&mut self, state: &dyn Fn() -> Checkpoint) {
-        if self.keep.is_some() {
-            self.state = Some(state());
+        if self.is_kept {
+            self.context.interrupt.keep(state());
         }
     }
 
     fn resume(&mut self) -> Option<Checkpoint> {
-        self.resume.take()
+        self.resumed.as_mut().and_then(Resumed::state)
     }
 }
 
-fn read_checkpoint(path: &Path) -> Result<Checkpoint, Failure> {
-    let text = exchange::read_text(path).map_err(|e| Failure::input(path, e))?;
-    serde_json::from_str(&text).map_err(|e| {
-        Failure::input(path, format!("{e}; give a file that --checkpoint has written"))
-    })
+impl Drop for Watch<'_> {
+    fn drop(&mut self) {
+        self.context.interrupt.unheeded();
+    }
 }

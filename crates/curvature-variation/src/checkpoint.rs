@@ -5,6 +5,9 @@ use gp_solver::{Checkpoint, Report, SolverError, Stage, StageReport};
 use crate::level::LevelNumbers;
 use crate::status::status_of;
 
+/// The name of the method in checkpoints.
+pub(crate) const METHOD: &str = "fair";
+
 /// Counts per level.
 const WIDTH: usize = 10;
 

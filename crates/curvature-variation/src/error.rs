@@ -6,6 +6,17 @@ use subdiv_catmull_clark::SubdivisionError;
 
 /// Why a surface cannot be faired. Ending early is not an error but a
 /// [`Status`](gp_solver::Status) of the report.
+///
+/// # Example
+/// ```
+/// use curvature_variation::{Error, Input, Options, solve};
+/// use geom_core::{DVec3, PolyMesh};
+/// let corners = vec![DVec3::ZERO, DVec3::X, DVec3::Y, DVec3::Z];
+/// let tetrahedron = PolyMesh::new(corners, &[[0, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3]])?;
+/// let error = solve(&tetrahedron.into(), &Options::default(), &mut ()).unwrap_err();
+/// assert_eq!(error, Error::Triangles { faces: 4 });
+/// # Ok::<(), geom_core::MeshError>(())
+/// ```
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 #[expect(missing_docs, reason = "the messages spell out every field")]

@@ -96,6 +96,11 @@ impl EnergyTable {
         energy.combine(|functional| self.get(functional))
     }
 
+    /// Values in the order of [`Functional::ALL`].
+    pub(crate) fn of(values: Vec<(Functional, f64)>) -> Self {
+        Self { values }
+    }
+
     /// Nothing has been computed: all values are NaN.
     pub(crate) fn unknown() -> Self {
         Self { values: Functional::ALL.map(|f| (f, f64::NAN)).to_vec() }

@@ -17,6 +17,7 @@ use crate::input::Input;
 use crate::level::LevelNumbers;
 use crate::metrics::{Measured, Meter};
 use crate::options::Options;
+use crate::replay::{Answers, Offering, Replayed};
 use crate::solution::Solution;
 
 /// Name of the group of the shares of a family's members.
@@ -87,6 +88,8 @@ pub(crate) fn solve(
     let begin = Instant::now();
     let family = Family::new(input, options)?;
     let Family { mesh, base, directions, surface } = &family;
+    let (fingerprint, resume) = (input.fingerprint(options), observer.resume());
+    let answers = Answers::resumed(fingerprint, resume.as_ref(), directions.len())?;
     let stage = Stage::only("family");
     let (mut added, mut weight) = (None, 1.0);
     if let Some(extra) = extra {
@@ -127,7 +130,11 @@ pub(crate) fn solve(
         ..LbfgsOptions::default()
     };
     let mut unknowns = vec![0.0; directions.len()];
-    let solved = lbfgs(&mut objective, &mut Euclidean, &mut unknowns, &settings, &stage, observer)?;
+    let solved = {
+        let mut known = Replayed { objective: &mut objective, answers: &answers };
+        let mut watch = Offering { observer: &mut *observer, answers: &answers };
+        lbfgs(&mut known, &mut Euclidean, &mut unknowns, &settings, &stage, &mut watch)?
+    };
     objective.place(&unknowns);
     let is_stopped = solved.status == Status::Interrupted;
     let meter = Meter { options, clamps: false, pulls: false };
@@ -163,6 +170,7 @@ pub(crate) fn solve(
         metrics,
         extrapolated,
         warnings,
+        clamps: meter.clamps,
         report: RunReport { status, ..RunReport::of_stages(stages) },
     })
 }

@@ -138,6 +138,14 @@ impl fmt::Display for Functional {
 }
 
 /// A weighted sum of functionals; a text such as `0.92*bending + 0.08*mehlum_tarrou` in files.
+///
+/// # Example
+/// ```
+/// use curvature_variation::{Energy, Functional};
+/// let energy: Energy = "2*bending + 0.5*area".parse()?;
+/// assert_eq!(energy.terms, [(2.0, Functional::Bending), (0.5, Functional::Area)]);
+/// # Ok::<(), curvature_variation::ExpressionError>(())
+/// ```
 #[derive(Clone, Debug, PartialEq)]
 pub struct Energy {
     /// Weight and functional of every term.

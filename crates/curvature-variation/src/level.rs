@@ -25,6 +25,10 @@ use crate::variables::{control_points, fixed_vertices};
 
 /// How many times the initial energy below zero an energy counts as having no minimum.
 const UNBOUNDED: f64 = 1e6;
+/// An energy below this share of the start's has vanished.
+const VANISHED: f64 = 1e-12;
+/// How often a level that has stopped gaining, but not for want of something to gain, goes on.
+const CERTIFICATES: usize = 40;
 
 /// What a level was made of, beside what its [`StageReport`] says.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -175,13 +179,40 @@ pub(crate) fn solve_level(
         Report { status: Status::Interrupted, ..state.report.clone() }
     } else {
         watch.initial_energy = initial_energy;
-        let ended = minimise(&mut level, &plan, &mut state, begin.stage, &mut watch);
-        match ended {
-            // Past all damping the Hessian is no longer finite.
-            Err(SolverError::NotPositiveDefinite { .. }) => {
-                return Err(Error::Torn { energy: options.energy.to_string() });
+        // Converged is only what a Gauss-Newton step, whatever the method was, cannot better by more
+        // than the tolerance either; where it can, the run goes on from there.
+        for certificates in 0.. {
+            let ended = minimise(&mut level, &plan, &mut state, begin.stage, &mut watch);
+            match ended {
+                // Past all damping the Hessian is no longer finite.
+                Err(SolverError::NotPositiveDefinite { .. }) => {
+                    return Err(Error::Torn { energy: options.energy.to_string() });
+                }
+                other => other?,
             }
-            other => other?,
+            let is_last = begin.stage.number + 1 == begin.stage.count;
+            if !is_last || state.report.status != Status::Converged {
+                break;
+            }
+            level.with_metric(|of| {
+                MetricAssembly::new(&surface, &evaluator, &freedom, &of.pulls, of.extra.as_ref())
+            })?;
+            let energy = level.energy.energy(&state.y).abs();
+            match level.left(&state.y, &mut watch)? {
+                // Stopped while it was looked at: the result stands, its status is not proven.
+                None => state.report.status = Status::Interrupted,
+                Some(left) if left.gain <= tolerance * energy => {}
+                // Energies that have all but vanished have nothing to gain.
+                Some(_) if energy <= VANISHED * initial_energy.abs() => {}
+                Some(left)
+                    if certificates < CERTIFICATES && state.report.iterations < plan.iterations =>
+                {
+                    state.go_on(left, &plan);
+                    continue;
+                }
+                Some(_) => state.report.status = Status::Stalled,
+            }
+            break;
         }
         state.report.clone()
     };

@@ -20,6 +20,7 @@
 
 mod analysis;
 pub mod blocks;
+mod cad;
 mod checkpoint;
 mod constraints;
 mod density;
@@ -44,6 +45,7 @@ mod limits;
 mod metric;
 mod metrics;
 mod options;
+mod replay;
 mod rules;
 mod samples;
 mod schedule;
@@ -56,8 +58,10 @@ mod symmetry;
 mod torus;
 mod umbilics;
 mod variables;
+mod written;
 
 pub use analysis::{SurfaceAnalysis, analyze};
+pub use cad::{LimitPatchError, LimitPatches, limit_patches};
 pub use constraints::Constraints;
 pub use discrete::discrete_bending;
 pub use error::Error;

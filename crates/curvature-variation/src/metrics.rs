@@ -28,6 +28,20 @@ const NO_ENERGY: f64 = 1e-9;
 const FITTED_TOLERANCE: f64 = 1e-4;
 
 /// The numbers of a fairing, under the names of the metrics file.
+///
+/// # Example
+/// ```
+/// use curvature_variation::{Input, Options, solve};
+/// let torus = Input::from(fixtures::quad_graphs::torus(6, 5, 1.0, 0.3));
+/// let energy = "bending".parse()?;
+/// let options = Options { energy, levels: 0, iterations: 5, ..Options::default() };
+/// let metrics = solve(&torus, &options, &mut ())?.metrics;
+/// assert!(metrics.energy_final < metrics.energy_initial);
+/// // The total curvature of a torus is 0, whatever its shape.
+/// assert!(metrics.gauss_bonnet_residual.is_some_and(|r| r < 0.01));
+/// assert_eq!((metrics.vertices, metrics.patches), (30, 30));
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Metrics {
     /// All functionals of the result by the fine quadrature.
@@ -77,20 +91,15 @@ pub struct Metrics {
     pub ms_per_gradient: f64,
     /// Peak resident memory in MB, for the program to fill in.
     pub peak_memory_mb: Option<f64>,
-    /// How many spline patches are fitted, see [`Metrics::add_splines`].
+    /// How many spline patches are fitted, see [`crate::Solution::add_splines`].
     #[serde(skip_serializing_if = "Option::is_none")]
     pub fitted_patches: Option<usize>,
     /// Largest distance of a fitted patch from the surface.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub fitted_deviation_max: Option<f64>,
-}
-
-impl Metrics {
-    /// Adds what is known of the result's spline patches.
-    pub fn add_splines(&mut self, splines: &SplinePatches) {
-        self.fitted_patches = Some(splines.fitted);
-        self.fitted_deviation_max = Some(splines.max_deviation);
-    }
+    /// All functionals, measured on the spline patches as they are written.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub written_energies: Option<BTreeMap<&'static str, f64>>,
 }
 
 /// What the user should know although there is a result.
@@ -107,6 +116,15 @@ pub enum Warning {
         /// Largest distance.
         deviation: f64,
     },
+    /// An energy of the written spline patches is not that of the surface.
+    WrittenEnergy {
+        /// The one that differs most.
+        functional: Functional,
+        /// Of the surface.
+        reported: f64,
+        /// Of the patches.
+        written: f64,
+    },
 }
 
 impl fmt::Display for Warning {
@@ -120,6 +138,12 @@ impl fmt::Display for Warning {
             Self::FittedPatches { deviation } => write!(
                 f,
                 "fitted spline patches are up to {deviation:.1e} off the surface; add a level"
+            ),
+            Self::WrittenEnergy { functional, reported, written } => write!(
+                f,
+                "the spline patches are not as fair as the surface: {functional} is \
+                 {written:.2} on them and {reported:.2} on it; take the control mesh where \
+                 third derivatives count"
             ),
         }
     }
@@ -204,6 +228,7 @@ impl Meter<'_> {
                 peak_memory_mb: None,
                 fitted_patches: None,
                 fitted_deviation_max: None,
+                written_energies: None,
             },
             extrapolated: None,
             warnings: Vec::new(),

@@ -170,6 +170,15 @@ serde_as_text!(Energy, Quadrature);
 
 options! {
     /// Settings of a fairing.
+    ///
+    /// # Example
+    /// ```
+    /// use curvature_variation::{Method, Options};
+    /// let energy = "0.92*bending + 0.08*mehlum_tarrou".parse()?;
+    /// let options = Options { energy, levels: 1, ..Options::default() };
+    /// assert_eq!((options.iterations, options.method), (2000, Method::LaggedGaussNewton));
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
     #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
     #[serde(default, deny_unknown_fields)]
     pub struct Options {

@@ -9,6 +9,19 @@ use crate::level::LevelNumbers;
 use crate::metrics::{Metrics, Warning};
 
 /// A faired surface with what is to be said about it.
+///
+/// # Example
+/// ```
+/// use curvature_variation::{Functional, Input, Options, solve};
+/// let torus = Input::from(fixtures::quad_graphs::torus(6, 5, 1.0, 0.3));
+/// let energy = "bending".parse()?;
+/// let options = Options { energy, levels: 0, iterations: 5, ..Options::default() };
+/// let solution = solve(&torus, &options, &mut ())?;
+/// let bending = Functional::Bending;
+/// assert!(solution.after.get(bending) < solution.before.get(bending));
+/// assert_eq!(solution.result.vertex_count(), 30);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Clone, Debug)]
 pub struct Solution {
     /// The control mesh of the result.
@@ -36,6 +49,8 @@ pub struct Solution {
     /// pulls of [`crate::Constraints::weights`]. The status is `Stalled` in place of `Converged` if
     /// the quadrature gap is above 1 %.
     pub report: RunReport,
+    /// Whether the quads at the boundary are left out of the energies.
+    pub(crate) clamps: bool,
     /// What every level was made of.
     pub levels: Vec<LevelNumbers>,
 }

@@ -2,7 +2,7 @@
 
 use gp_solver::{Checkpoint, Extra, Observer, Problem, RunReport, Stage, Status};
 
-use crate::checkpoint::{levels_of, stage_name, with_levels};
+use crate::checkpoint::{METHOD, levels_of, stage_name, with_levels};
 use crate::error::Error;
 use crate::evaluator::{EnergyTable, unflatten};
 use crate::family;
@@ -17,9 +17,6 @@ use crate::schedule::Control;
 use crate::solution::Solution;
 use crate::variables::{control_points, fixed_vertices};
 
-/// The name of the method in checkpoints.
-const METHOD: &str = "fair";
-
 /// Minimises a curvature functional of the Catmull-Clark surface of a mesh of quads or n-gons.
 ///
 /// The mesh is refined until all faces are quads with regular rings around extraordinary
@@ -28,7 +25,7 @@ const METHOD: &str = "fair";
 /// their family is found instead, see [`Input::members`].
 ///
 /// Checkpoints are offered at the start of every level, after every Gauss-Newton step and after every
-/// round of L-BFGS; a resumed run ends with the same bytes.
+/// round of L-BFGS (every step in a family); a resumed run ends with the same bytes.
 ///
 /// # Errors
 /// [`Error`] for what cannot be attempted. Ending early is a [`Status`] of the report.
@@ -233,5 +230,6 @@ fn fair(
         warnings,
         report: RunReport { status, ..RunReport::of_stages(stages) },
         levels: numbers,
+        clamps: meter(input, options).clamps,
     })
 }

@@ -96,7 +96,7 @@ pub fn spline_patches(
 }
 
 /// Where the patches of one basis are interpolated and checked.
-struct FittedRule {
+pub(crate) struct FittedRule {
     knots: KnotVector,
     nodes: Vec<f64>,
     checks: Vec<f64>,
@@ -129,7 +129,10 @@ fn smooth_knots() -> Result<KnotVector, KnotError> {
 }
 
 impl FittedRule {
-    fn new(surface: &SubdivisionSurface, basis: BasisId) -> Result<Self, SplinePatchError> {
+    pub(crate) fn new(
+        surface: &SubdivisionSurface,
+        basis: BasisId,
+    ) -> Result<Self, SplinePatchError> {
         let edges = if surface.is_wide(basis) && !surface.is_smooth(basis) {
             Some(OuterEdges::new(surface, basis)?)
         } else {
@@ -162,7 +165,10 @@ impl FittedRule {
         Ok(Self { knots, nodes, checks, at_nodes, at_checks, edges })
     }
 
-    fn fit(&self, control: &dyn Fn(usize) -> DVec3) -> Result<(BsplineSurface, f64), FitError> {
+    pub(crate) fn fit(
+        &self,
+        control: &dyn Fn(usize) -> DVec3,
+    ) -> Result<(BsplineSurface, f64), FitError> {
         let point = |weights: &JetWeights| -> DVec3 {
             weights.row(0).iter().enumerate().map(|(k, &w)| w * control(k)).sum()
         };

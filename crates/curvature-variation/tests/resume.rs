@@ -18,7 +18,9 @@ struct Keeper {
 
 impl Observer for Keeper {
     fn step(&mut self, progress: &Progress<'_>) -> ControlFlow<()> {
-        assert_eq!(progress.x.len(), 3 * progress.stage.name.parse::<usize>().unwrap_or(0));
+        if let Ok(vertices) = progress.stage.name.parse::<usize>() {
+            assert_eq!(progress.x.len(), 3 * vertices);
+        }
         self.steps += 1;
         if self.steps_left.is_some_and(|left| self.steps > left) {
             return ControlFlow::Break(());
@@ -44,6 +46,7 @@ fn bits(solution: &Solution) -> Vec<[u64; 3]> {
 fn ends_with_the_same_bytes(input: &Input, options: &Options) {
     let mut whole = Keeper::default();
     let want = solve(input, options, &mut whole).expect("it can be faired");
+    assert!(whole.steps > 4, "{} steps", whole.steps);
     for moment in 0..10 {
         let steps = moment * whole.steps / 10;
         let mut first = Keeper { steps_left: Some(steps), ..Keeper::default() };
@@ -90,6 +93,21 @@ fn other_methods_and_constraints_are_resumed_to_the_bit() {
         let pinned = Input { constraints, ..Input::from(mesh.clone()) };
         ends_with_the_same_bytes(&pinned, &Options { iterations: 20, levels: 0, ..options });
     }
+}
+
+#[test]
+fn families_are_resumed_to_the_bit() {
+    let member = |small| quad_graphs::torus(12, 8, 1.0, small);
+    let members = vec![member(0.6), quad_graphs::torus(12, 8, 1.3, 0.4)];
+    let family = Input { members, ..Input::from(member(0.3)) };
+    let options = Options { levels: 1, ..Options::default() };
+    ends_with_the_same_bytes(&family, &options);
+    let mut first = Keeper { steps_left: Some(3), ..Keeper::default() };
+    solve(&family, &options, &mut first).expect("it can be faired");
+    let mut second = Keeper { from: first.last, ..Keeper::default() };
+    let other = Options { levels: 0, ..options };
+    let error = solve(&family, &other, &mut second).expect_err("other options").to_string();
+    assert!(error.contains("another input or other options"), "{error}");
 }
 
 #[test]

@@ -1,5 +1,7 @@
 //! Colours of written meshes, in linear RGB as glTF wants them.
 
+use crate::mesh::Mesh;
+
 /// Blue over white to red for -1 to 1; readable by colour-blind people. The stops are given in
 /// sRGB and mixed in linear light.
 pub(crate) fn diverging(t: f64) -> [f32; 3] {
@@ -56,6 +58,18 @@ pub(crate) fn diverging_range(values: &[f64]) -> f64 {
     let at = (sizes.len() - 1) * 95 / 100;
     let (_, range, _) = sizes.select_nth_unstable_by(at, f64::total_cmp);
     if *range > 0.0 { *range } else { 1.0 }
+}
+
+/// Colours of the vertices by their `K`, or by their first field; none where groups have colours.
+pub(crate) fn field_colors(mesh: &Mesh) -> Vec<[f32; 3]> {
+    let shown = mesh.vertex_fields.iter().find(|f| f.name == "K").or(mesh.vertex_fields.first());
+    match shown {
+        Some(field) if mesh.groups.is_empty() => {
+            let range = diverging_range(&field.values);
+            field.values.iter().map(|v| diverging(v / range)).collect()
+        }
+        _ => Vec::new(),
+    }
 }
 
 #[cfg(test)]

@@ -120,7 +120,7 @@ fn escape(text: &str) -> String {
 pub fn write_dxf(drawing: &Drawing, unit: &LengthUnit) -> String {
     let mut dxf = String::new();
     let bounds = drawing.bounds();
-    pair(&mut dxf, 999, &format!("umbilic, lengths in {unit}"));
+    pair(&mut dxf, 999, &format!("Umbilic, lengths in {unit}"));
     section(&mut dxf, "HEADER");
     pair(&mut dxf, 9, "$ACADVER");
     pair(&mut dxf, 1, "AC1009");

@@ -4,7 +4,7 @@ use crate::error::{ReadError, WriteError};
 use crate::replaced::{check_unprotected, keep, temporary};
 use std::ffi::OsString;
 use std::fs::{self, File};
-use std::io::Write;
+use std::io::{Read, Write};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU64, Ordering};
 
@@ -18,6 +18,17 @@ pub fn read_bytes(path: &Path) -> Result<Vec<u8>, ReadError> {
         return Err(ReadError::NotAFile);
     }
     Ok(fs::read(path)?)
+}
+
+/// All bytes of standard input, up to 2 GiB.
+pub(crate) fn read_standard_input() -> Result<Vec<u8>, ReadError> {
+    const MOST: u64 = 2 << 30;
+    let mut bytes = Vec::new();
+    std::io::stdin().lock().take(MOST + 1).read_to_end(&mut bytes)?;
+    if bytes.len() as u64 > MOST {
+        return Err(ReadError::content("standard input does not end", "pass at most 2 GiB"));
+    }
+    Ok(bytes)
 }
 
 /// The text of a regular file.
@@ -58,6 +69,18 @@ pub fn check_writable(path: &Path) -> Result<(), WriteError> {
 /// [`WriteError::InFile`] names the file at fault. No target was touched, unless a rename itself
 /// fails after an earlier one succeeded (another process removed the folder in between).
 pub fn write_files(files: &[(&Path, &[u8])]) -> Result<(), WriteError> {
+    write_files_unless(files, &|| false).map(drop)
+}
+
+/// As [`write_files`], unless `is_stopped` says so before the renaming begins: asked for every
+/// megabyte and file. Returns whether the files were written; if not, nothing is left behind.
+///
+/// # Errors
+/// As [`write_files`].
+pub fn write_files_unless(
+    files: &[(&Path, &[u8])],
+    is_stopped: &dyn Fn() -> bool,
+) -> Result<bool, WriteError> {
     let named = |path: &Path| {
         let file = path.display().to_string();
         move |error: WriteError| WriteError::InFile { file, error: Box::new(error) }
@@ -65,14 +88,19 @@ pub fn write_files(files: &[(&Path, &[u8])]) -> Result<(), WriteError> {
     let mut prepared = Vec::with_capacity(files.len());
     for (path, bytes) in files {
         let mut file = Prepared::create(path).map_err(named(path))?;
-        file.fill(bytes).map_err(named(path))?;
+        if !file.fill(bytes, is_stopped).map_err(named(path))? || is_stopped() {
+            return Ok(false);
+        }
         prepared.push((path, file));
     }
     for (path, file) in prepared {
         file.rename().map_err(named(path))?;
     }
-    Ok(())
+    Ok(true)
 }
+
+/// Bytes that are written between two questions whether to stop.
+const CHUNK: usize = 1 << 20;
 
 /// A temporary file beside its target; removed when dropped before [`Prepared::rename`].
 struct Prepared {
@@ -113,9 +141,16 @@ impl Prepared {
         Ok(prepared)
     }
 
-    fn fill(&mut self, bytes: &[u8]) -> Result<(), WriteError> {
-        self.file.write_all(bytes)?;
-        Ok(self.file.sync_all()?)
+    /// Whether all of it was written and has reached the disk; not if `is_stopped`.
+    fn fill(&mut self, bytes: &[u8], is_stopped: &dyn Fn() -> bool) -> Result<bool, WriteError> {
+        for chunk in bytes.chunks(CHUNK) {
+            if is_stopped() {
+                return Ok(false);
+            }
+            self.file.write_all(chunk)?;
+        }
+        self.file.sync_all()?;
+        Ok(true)
     }
 
     fn rename(mut self) -> Result<(), WriteError> {
@@ -161,6 +196,25 @@ mod tests {
         write_files(&[(&old, b"after"), (&other, b"x")]).unwrap();
         assert_eq!(fs::read(&old).unwrap(), b"after");
         assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 2);
+    }
+
+    #[test]
+    fn a_stop_before_the_renaming_leaves_nothing_behind() {
+        let folder = tempfile::tempdir().unwrap();
+        let (a, b) = (folder.path().join("a"), folder.path().join("b"));
+        fs::write(&a, "before").unwrap();
+        let large = vec![7; 3 * CHUNK + 1];
+        // Two files of one and four chunks: asked before each chunk and after each file.
+        for questions in 0..7 {
+            let asked = std::cell::Cell::new(0);
+            let is_stopped = || asked.replace(asked.get() + 1) == questions;
+            let written = write_files_unless(&[(&a, b"after"), (&b, &large)], &is_stopped);
+            assert_eq!(written, Ok(false), "question {questions}");
+            assert_eq!(fs::read(&a).unwrap(), b"before");
+            assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 1);
+        }
+        assert_eq!(write_files_unless(&[(&a, b"after"), (&b, &large)], &|| false), Ok(true));
+        assert_eq!((fs::read(&a).unwrap(), fs::read(&b).unwrap()), (b"after".to_vec(), large));
     }
 
     #[test]

@@ -2,15 +2,17 @@
 
 use crate::drawing::{Drawing, DrawnLine, write_dxf, write_svg};
 use crate::error::{ReadError, WriteError};
-use crate::files::{into_text, read_bytes};
+use crate::files::{into_text, read_bytes, read_standard_input};
 use crate::glb::{read_glb, write_glb};
+use crate::guess::{Guess, guess, is_same};
 use crate::json::{read_json, write_compas, write_geomdl};
 use crate::mesh::Mesh;
 use crate::model::Model;
 use crate::obj::{read_obj, write_obj};
 use crate::off::read_off;
 use crate::ply::{read_ply, write_ply};
-use crate::sample::surface_mesh;
+use crate::rhino::{read_3dm, write_3dm};
+use crate::sample::face_mesh;
 use crate::scene::{read_scene, write_scene};
 use crate::step::{read_step, write_step};
 use crate::stl::{read_stl, write_stl};
@@ -19,23 +21,60 @@ use std::borrow::Cow;
 use std::path::Path;
 
 /// Extensions that [`read_model`] knows.
-pub const READABLE: &str = "ron, step, stp, obj, ply, off, stl, glb, json";
-/// Coordinates GLB's single precision can hold, distances between them included.
+pub const READABLE: &str = "ron, step, stp, 3dm, obj, ply, off, stl, glb, json";
+/// Coordinates that single precision can hold, distances between them included.
 const SINGLE_PRECISION: f64 = 1e38;
 
 /// Extensions that [`encode_model`] knows.
-pub const WRITABLE: &str = "ron, step, stp, obj, ply, stl, glb, json, svg, dxf";
+pub const WRITABLE: &str = "ron, step, stp, 3dm, obj, ply, stl, glb, json, svg, dxf";
 
-/// Reads any file of geometry, by its extension.
+/// The path that stands for standard input.
+pub const STANDARD_INPUT: &str = "-";
+
+/// Reads any file of geometry, by its extension; by its content where the extension is missing,
+/// unknown or certainly wrong, which a warning says. The path `-` is standard input.
 ///
 /// # Errors
 /// [`ReadError`] of the reader, or [`ReadError::UnknownFormat`].
 pub fn read_model(path: &Path) -> Result<Model, ReadError> {
-    let extension = extension_of(path);
-    if !is_listed(READABLE, &extension) {
-        return Err(ReadError::UnknownFormat { extension, known: READABLE });
+    read_model_as(path, None)
+}
+
+/// As [`read_model`], in a format of [`READABLE`] whatever name and content say.
+///
+/// # Errors
+/// As [`read_model`].
+pub fn read_model_as(path: &Path, format: Option<&str>) -> Result<Model, ReadError> {
+    if let Some(format) = format {
+        let format = format.to_lowercase();
+        if !is_listed(READABLE, &format) {
+            return Err(ReadError::UnknownFormat { extension: format, known: READABLE });
+        }
+        return decode_model(&format, input_bytes(path)?);
     }
-    decode_model(&extension, read_bytes(path)?)
+    let extension = if is_standard_input(path) { String::new() } else { extension_of(path) };
+    let known = is_listed(READABLE, &extension);
+    let bytes = input_bytes(path)?;
+    let (format, warning) = match guess(&bytes) {
+        Some(Guess::Sure(other)) if known && !is_same(&extension, other) => {
+            (other, Some(format!("the content is {} whatever the name says", other.to_uppercase())))
+        }
+        _ if known => (extension.as_str(), None),
+        Some(Guess::Sure(found) | Guess::Likely(found)) => (found, None),
+        None => return Err(ReadError::UnknownFormat { extension, known: READABLE }),
+    };
+    let mut model = decode_model(format, bytes)?;
+    model.warnings.extend(warning);
+    Ok(model)
+}
+
+/// Whether a path stands for standard input.
+fn is_standard_input(path: &Path) -> bool {
+    path.as_os_str() == STANDARD_INPUT
+}
+
+fn input_bytes(path: &Path) -> Result<Vec<u8>, ReadError> {
+    if is_standard_input(path) { read_standard_input() } else { read_bytes(path) }
 }
 
 /// Reads the bytes of a file with this (lower case) extension.
@@ -46,7 +85,8 @@ pub fn decode_model(extension: &str, bytes: Vec<u8>) -> Result<Model, ReadError>
     match extension {
         "ron" => read_scene(&into_text(bytes)?),
         "step" | "stp" => read_step(&bytes),
-        "obj" => read_obj(&into_text(bytes)?).map(of_mesh),
+        "3dm" => read_3dm(&bytes),
+        "obj" => read_obj(&into_text(bytes)?),
         "ply" => read_ply(&bytes),
         "off" => read_off(&into_text(bytes)?).map(of_mesh),
         "stl" => read_stl(&bytes).map(of_mesh),
@@ -94,7 +134,16 @@ pub fn encode_model(path: &Path, model: &Model) -> Result<Vec<u8>, WriteError> {
             if model.surfaces.is_empty() {
                 return Err(unsupported("STEP", "a model without surfaces"));
             }
-            Ok(write_step(model).into_bytes())
+            let text = write_step(model).map_err(|e| unsupported("STEP", &e.to_string()))?;
+            Ok(text.into_bytes())
+        }
+        "3dm" => {
+            let is_empty = model.surfaces.is_empty() && model.grids.is_empty();
+            if is_empty && model.meshes.iter().all(|m| m.positions.is_empty()) {
+                return Err(unsupported("3DM", "a model without surfaces, meshes and points"));
+            }
+            no_far_meshes("3DM", &model.meshes)?;
+            write_3dm(model).map_err(|e| unsupported("3DM", &e.to_string()))
         }
         "obj" => Ok(write_obj(&sampled(model)).into_bytes()),
         "ply" => Ok(write_ply(&sampled(model), &model.unit)),
@@ -107,10 +156,7 @@ pub fn encode_model(path: &Path, model: &Model) -> Result<Vec<u8>, WriteError> {
         }
         "glb" => {
             let meshes = sampled(model);
-            let far = |p: &DVec3| !(p.abs().max_element() < SINGLE_PRECISION);
-            if meshes.iter().any(|mesh| mesh.positions.iter().any(far)) {
-                return Err(unsupported("GLB", "coordinates of 1e38 and beyond"));
-            }
+            no_far_meshes("GLB", &meshes)?;
             Ok(write_glb(&meshes, &model.unit))
         }
         // COMPAS has meshes and surfaces, geomdl surfaces only: the plain one where it suffices.
@@ -147,7 +193,7 @@ fn sampled(model: &Model) -> Cow<'_, [Mesh]> {
     if model.surfaces.is_empty() {
         return Cow::Borrowed(&model.meshes);
     }
-    let sampled = model.surfaces.iter().map(|s| surface_mesh(&s.name, &s.surface, None));
+    let sampled = model.surfaces.iter().map(|s| face_mesh(s, None));
     Cow::Owned(sampled.chain(model.meshes.iter().cloned()).collect())
 }
 
@@ -157,6 +203,14 @@ fn of_mesh((mesh, warnings): (Mesh, Vec<String>)) -> Model {
 
 fn no_meshes(format: &'static str, model: &Model) -> Result<(), WriteError> {
     if model.meshes.is_empty() { Ok(()) } else { Err(unsupported(format, "meshes")) }
+}
+
+fn no_far_meshes(format: &'static str, meshes: &[Mesh]) -> Result<(), WriteError> {
+    let far = |p: &DVec3| !(p.abs().max_element() < SINGLE_PRECISION);
+    if meshes.iter().any(|mesh| mesh.positions.iter().any(far)) {
+        return Err(unsupported(format, "coordinates of 1e38 and beyond"));
+    }
+    Ok(())
 }
 
 fn unsupported(format: &'static str, what: &str) -> WriteError {

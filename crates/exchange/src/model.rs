@@ -2,8 +2,8 @@
 
 use crate::mesh::Mesh;
 use crate::unit::LengthUnit;
-use bspline::BsplineSurface;
-use geom_core::DVec3;
+use bspline::{BsplineSurface, Trim};
+use geom_core::{CurvatureStatistics, DVec3};
 
 /// A surface with the name it has in files; the name may be empty.
 #[derive(Clone, Debug, PartialEq)]
@@ -12,6 +12,29 @@ pub struct NamedSurface {
     pub name: String,
     /// The surface.
     pub surface: BsplineSurface,
+    /// The part of the surface that counts; without, all of it.
+    pub trim: Option<Trim>,
+    /// Linear RGB in 0..=1, if the file gives the face a colour.
+    pub color: Option<[f32; 3]>,
+    /// The layer it stands on, in formats that have layers; may be empty.
+    pub layer: String,
+}
+
+impl NamedSurface {
+    /// A whole surface without a colour.
+    #[must_use]
+    pub fn new(name: impl Into<String>, surface: BsplineSurface) -> Self {
+        Self { name: name.into(), surface, trim: None, color: None, layer: String::new() }
+    }
+
+    /// Area and curvatures of the part that counts.
+    #[must_use]
+    pub fn curvature_statistics(&self) -> CurvatureStatistics {
+        match &self.trim {
+            None => self.surface.curvature_statistics(),
+            Some(trim) => self.surface.curvature_statistics_within(trim),
+        }
+    }
 }
 
 /// A regular grid of points, `points[i * n_v + j]`.
@@ -46,7 +69,7 @@ impl Model {
     /// One surface, nothing else.
     #[must_use]
     pub fn of_surface(name: &str, surface: BsplineSurface, unit: LengthUnit) -> Self {
-        let surfaces = vec![NamedSurface { name: name.to_owned(), surface }];
+        let surfaces = vec![NamedSurface::new(name, surface)];
         Self { unit, surfaces, ..Self::default() }
     }
 

@@ -1,19 +1,26 @@
-//! Wavefront OBJ: polygons with groups, polylines and points. Texture coordinates, normals and
-//! materials are skipped when reading; free-form curves of degree 1 are polylines.
+//! Wavefront OBJ: polygons with groups, polylines, points and free-form surfaces. Texture
+//! coordinates, normals and materials are skipped when reading.
 
 use crate::color::{display, palette};
 use crate::error::{ReadError, clip};
 use crate::mesh::{Group, Mesh};
+use crate::model::{Model, NamedSurface};
+use crate::obj_freeform::{self, FreeForm, Vertices};
+use crate::polyline::{PIECES, points_of, points_on};
+use crate::text_number::coordinate;
 use geom_core::DVec3;
 use std::collections::HashMap;
 use std::fmt::Write;
 
 /// Reads an OBJ file. Faces, lines and points share one list of vertices, in the order of the file.
+/// B-spline and Bezier surfaces are surfaces with their trims; curves become polylines, exact ones
+/// if they are of degree 1.
 ///
 /// # Errors
 /// [`ReadError::Text`] names the first line at fault.
-pub fn read_obj(text: &str) -> Result<(Mesh, Vec<String>), ReadError> {
+pub fn read_obj(text: &str) -> Result<Model, ReadError> {
     let mut reader = Reader::default();
+    reader.free_form.allow(text.len());
     let mut joined = String::new();
     for (k, line) in text.lines().enumerate() {
         // A backslash at the end continues the statement on the next line.
@@ -40,8 +47,15 @@ struct Reader {
     group: String,
     group_ids: HashMap<String, u32>,
     corners: Vec<u32>,
-    free_form: Option<usize>,
+    /// Weights of the first vertices, up to the last one that has one.
+    weights: Vec<f64>,
+    free_form: obj_freeform::Reader,
     degree_one: bool,
+    model: Model,
+    /// Polylines in place of curves, apart from the vertices of the file.
+    curves: Vec<Mesh>,
+    /// Kinds of free-form geometry that are not read, with the line of the first.
+    unknown: Vec<(String, usize)>,
 }
 
 impl Reader {
@@ -56,18 +70,40 @@ impl Reader {
                 self.group = words.collect::<Vec<_>>().join(" ");
                 Ok(())
             }
-            Some("deg") => {
-                self.degree_one = words.next() == Some("1");
-                Ok(())
-            }
             // A curve of degree 1 is the polyline of its control points, behind two parameters.
             Some("curv") if self.degree_one => self.line(words.skip(2), number),
-            Some("curv" | "surf") => {
-                self.free_form.get_or_insert(number);
-                Ok(())
+            Some(keyword) => {
+                let words: Vec<&str> = words.collect();
+                if keyword == "deg" {
+                    self.degree_one = words.first() == Some(&"1");
+                }
+                self.free_form(keyword, &words, number)
             }
-            _ => Ok(()),
+            None => Ok(()),
         }
+    }
+
+    fn free_form(&mut self, keyword: &str, words: &[&str], number: usize) -> Result<(), ReadError> {
+        let vertices = Vertices { positions: &self.mesh.positions, weights: &self.weights };
+        match self.free_form.statement(keyword, words, number, vertices)? {
+            None | Some(FreeForm::Planar) => {}
+            Some(FreeForm::Surface(surface, trim)) => {
+                let named = NamedSurface::new(self.group.clone(), surface);
+                self.model.surfaces.push(NamedSurface { trim, ..named });
+            }
+            Some(FreeForm::Curve(curve)) => {
+                self.free_form.spend(points_of(&curve), number)?;
+                let mut mesh = Mesh { name: self.group.clone(), ..Mesh::default() };
+                mesh.push_polyline(&points_on(&curve));
+                self.curves.push(mesh);
+            }
+            Some(FreeForm::Unknown(kind)) => {
+                if !self.unknown.iter().any(|(known, _)| *known == kind) {
+                    self.unknown.push((kind, number));
+                }
+            }
+        }
+        Ok(())
     }
 
     fn vertex<'a>(
@@ -87,6 +123,11 @@ impl Reader {
             return Err(ReadError::text(number, "more than 2^32 vertices", "split the file"));
         }
         self.mesh.positions.push(DVec3::from_array(xyz));
+        // One number more is a weight, three are a colour.
+        if let (Some(weight), None) = (words.next(), words.next()) {
+            self.weights.resize(self.mesh.positions.len() - 1, 1.0);
+            self.weights.push(coordinate(weight, number)?);
+        }
         Ok(())
     }
 
@@ -162,7 +203,7 @@ impl Reader {
         Ok(())
     }
 
-    fn finish(mut self) -> Result<(Mesh, Vec<String>), ReadError> {
+    fn finish(mut self) -> Result<Model, ReadError> {
         let mesh = &mut self.mesh;
         if mesh.positions.is_empty() {
             let what = "the file has no vertex";
@@ -174,8 +215,23 @@ impl Reader {
             mesh.groups.clear();
             mesh.face_groups.clear();
         }
-        let warning = |line| format!("line {line}: free-form curves and surfaces are ignored");
-        Ok((self.mesh, self.free_form.map(warning).into_iter().collect()))
+        let mut model = self.model;
+        for (kind, line) in self.unknown {
+            model.warnings.push(format!("line {line}: free-form `{kind}` geometry is left out"));
+        }
+        if !self.curves.is_empty() {
+            let count = self.curves.len();
+            let what =
+                format!("{count} curves became polylines with {PIECES} pieces per knot span");
+            model.warnings.push(what);
+        }
+        // Vertices that only serve free-form geometry are no points of their own.
+        let serves = self.mesh.faces.is_empty() && self.mesh.lines.is_empty();
+        if !serves || (model.surfaces.is_empty() && self.curves.is_empty()) {
+            model.meshes.push(self.mesh);
+        }
+        model.meshes.extend(self.curves);
+        Ok(model)
     }
 }
 
@@ -188,17 +244,6 @@ fn repeated(corners: &[u32]) -> Option<u32> {
     let mut sorted = corners.to_vec();
     sorted.sort_unstable();
     sorted.windows(2).find(|pair| pair[0] == pair[1]).map(|pair| pair[0])
-}
-
-/// A finite number from a word of a text file.
-pub(crate) fn coordinate(word: &str, line: usize) -> Result<f64, ReadError> {
-    match word.parse::<f64>() {
-        Ok(value) if value.is_finite() => Ok(value),
-        _ => {
-            let what = format!("`{}` is not a finite number", clip(word));
-            Err(ReadError::text(line, what, "write coordinates as decimal numbers"))
-        }
-    }
 }
 
 /// OBJ text of several meshes, each an object (if named) with its groups; coordinates are written
@@ -280,20 +325,21 @@ mod tests {
     fn quads_groups_lines_and_negative_indices() {
         let text = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0.5 # half up\ng left\nf 1/1/1 2/2/2 -2//3 \\\n -1\n\
                     g right\nf 1 2 3\nl 1 3 -1\nvn 0 0 1\n";
-        let (mesh, warnings) = read_obj(text).unwrap();
+        let model = read_obj(text).unwrap();
+        let mesh = model.meshes[0].clone();
         assert_eq!(mesh.faces.iter().collect::<Vec<_>>(), [&[0, 1, 2, 3][..], &[0, 1, 2]]);
         assert_eq!(mesh.lines.get(0), [0, 2, 3]);
         assert_eq!(mesh.groups, [Group::new("left"), Group::new("right")]);
         assert_eq!(mesh.face_groups, [0, 1]);
         assert_eq!(mesh.positions[3], DVec3::new(0.0, 1.0, 0.5));
-        assert!(warnings.is_empty());
+        assert!(model.warnings.is_empty());
         let written = write_obj(std::slice::from_ref(&mesh));
         assert!(written.contains("g left\nusemtl left\nf 1 2 3 4\ng right\nusemtl right\n"));
         let [with, materials] = write_obj_and_materials(std::slice::from_ref(&mesh), "a.mtl");
         assert_eq!(with, format!("mtllib a.mtl\n{written}"));
         assert!(materials.starts_with("newmtl left\nKd 0.0000 0.4470 0.6980\nnewmtl right\nKd "));
-        assert_eq!(read_obj(&with).unwrap().0, mesh);
-        assert_eq!(read_obj(&written).unwrap(), (mesh, warnings));
+        assert_eq!(read_obj(&with).unwrap(), model);
+        assert_eq!(read_obj(&written).unwrap(), model);
     }
 
     #[test]

@@ -2,7 +2,7 @@
 
 use crate::error::{ReadError, clip};
 use crate::mesh::Mesh;
-use crate::obj::coordinate;
+use crate::text_number::coordinate;
 use geom_core::DVec3;
 
 /// Reads an OFF file (also `COFF`, `NOFF`, `STOFF` and their combinations: extra numbers of
@@ -50,32 +50,26 @@ pub fn read_off(text: &str) -> Result<(Mesh, Vec<String>), ReadError> {
     }
     let mut mesh = Mesh::default();
     for _ in 0..vertices {
-        let (number, line) = lines.next().ok_or_else(|| ended("its last vertex"))?;
+        let mut words = Words::new();
         let mut xyz = [0.0; 3];
-        let mut words = line.split_ascii_whitespace();
         for value in &mut xyz {
-            let word = words.next().ok_or_else(|| {
-                ReadError::text(number, "a vertex with fewer than 3 coordinates", "give it three")
-            })?;
+            let (word, number) = words.next(&mut lines).ok_or_else(|| ended("its last vertex"))?;
             *value = coordinate(word, number)?;
         }
         mesh.positions.push(DVec3::from_array(xyz));
     }
     let mut corners = Vec::new();
     for _ in 0..faces {
-        let (number, line) = lines.next().ok_or_else(|| ended("its last face"))?;
-        let mut words = line.split_ascii_whitespace();
-        let n: usize = words.next().and_then(|word| word.parse().ok()).unwrap_or(0);
+        let mut words = Words::new();
+        let (word, number) = words.next(&mut lines).ok_or_else(|| ended("its last face"))?;
+        let n: usize = word.parse().unwrap_or(0);
         if n < 3 {
             let what = format!("face with {n} corners");
             return Err(ReadError::text(number, what, "a face needs at least 3"));
         }
         corners.clear();
         for _ in 0..n {
-            let Some(word) = words.next() else {
-                let what = format!("the face has {} of its {n} corners", corners.len());
-                return Err(ReadError::text(number, what, "put all corners on its line"));
-            };
+            let (word, number) = words.next(&mut lines).ok_or_else(|| ended("its last face"))?;
             match word.parse::<usize>() {
                 Ok(index) if index < vertices => corners.push(index as u32),
                 _ => {
@@ -95,6 +89,32 @@ pub fn read_off(text: &str) -> Result<(Mesh, Vec<String>), ReadError> {
     Ok((mesh, rest.map(warning).into_iter().collect()))
 }
 
+/// The words of one vertex or face, which may run on over lines; what is left of its last line
+/// (colours and the like) is not looked at.
+struct Words<'a> {
+    line: std::str::SplitAsciiWhitespace<'a>,
+    number: usize,
+}
+
+impl<'a> Words<'a> {
+    fn new() -> Self {
+        Self { line: "".split_ascii_whitespace(), number: 0 }
+    }
+
+    fn next(
+        &mut self,
+        lines: &mut impl Iterator<Item = (usize, &'a str)>,
+    ) -> Option<(&'a str, usize)> {
+        loop {
+            if let Some(word) = self.line.next() {
+                return Some((word, self.number));
+            }
+            let (number, line) = lines.next()?;
+            (self.number, self.line) = (number, line.split_ascii_whitespace());
+        }
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -110,6 +130,10 @@ mod tests {
         assert_eq!(mesh.positions[4], DVec3::new(0.5, 2.0, 1.0));
         assert_eq!(mesh.faces.iter().collect::<Vec<_>>(), [&[0, 1, 2, 3][..], &[3, 2, 4]]);
         assert!(read_off("OFF 1 0 0\n1 2 3\n").is_ok());
+        let (over_lines, _) =
+            read_off("OFF\n3 1 0\n0\n0 0\n1 0 0\n0 1\n0\n3 0\n1\n2\n").unwrap();
+        assert_eq!(over_lines.positions[2], DVec3::Y);
+        assert_eq!(over_lines.faces.get(0), [0, 1, 2]);
     }
 
     #[test]
@@ -120,11 +144,11 @@ mod tests {
             ("OFF\nx\n", "line 2: no counts"),
             ("OFF\n4000000000 1 0\n", "line 2: 4000000000 vertices and 1 faces do not fit"),
             ("OFF\n2 0 0\n0 0 0\n", "line 3: the file ends before its last vertex"),
-            ("OFF\n1 0 0\n0 0\n", "line 3: a vertex with fewer than 3"),
+            ("OFF\n1 0 0\n0 0\n", "line 3: the file ends before its last vertex"),
             ("OFF\n1 0 0\n0 0 inf\n", "line 3: `inf` is not a finite number"),
             ("OFF\n1 1 0\n0 0 0\n3 0 0 1\n", "line 4: `1` names no vertex"),
             ("OFF\n1 1 0\n0 0 0\n2 0 0\n", "line 4: face with 2 corners"),
-            ("OFF\n1 1 0\n0 0 0\n3 0\n", "line 4: the face has 1 of its 3 corners"),
+            ("OFF\n1 1 0\n0 0 0\n3 0\n", "line 4: the file ends before its last face"),
             ("OFF\n0 0 0\n", "the file has no vertex"),
         ];
         for (text, want) in cases {

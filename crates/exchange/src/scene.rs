@@ -4,9 +4,15 @@ use crate::error::ReadError;
 use crate::model::{Model, NamedSurface, PointGrid};
 use crate::ron_text::{from_ron, to_ron};
 use crate::unit::LengthUnit;
-use bspline::{BsplineSurface, Degree, KnotVector, SplineError};
+use bspline::{
+    BsplineCurve, BsplineSurface, Degree, KnotVector, SplineError, Trim, TrimCurve, TrimError,
+    TrimLoop,
+};
 use geom_core::DVec3;
 use serde::{Deserialize, Serialize};
+
+/// Ends of trim curves that meet to within this share of the domain are one corner.
+const SAME_CORNER: f64 = 1e-9;
 
 #[derive(Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -36,6 +42,37 @@ struct SurfaceText {
     control_points: Vec<Vec<Point>>,
     #[serde(default, skip_serializing_if = "Option::is_none")]
     weights: Option<Vec<Vec<f64>>>,
+    /// Linear RGB in 0..=1.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    color: Option<(f32, f32, f32)>,
+    /// Loops of curves around the part that counts.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    trims: Vec<Vec<TrimText>>,
+}
+
+/// A curve in the parameter plane, and the same curve in space if that is known.
+#[derive(Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct TrimText {
+    degree: usize,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    knots: Option<Vec<f64>>,
+    points: Vec<(f64, f64)>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    weights: Option<Vec<f64>>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    edge: Option<EdgeText>,
+}
+
+#[derive(Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct EdgeText {
+    degree: usize,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    knots: Option<Vec<f64>>,
+    points: Vec<Point>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    weights: Option<Vec<f64>>,
 }
 
 #[derive(Serialize, Deserialize)]
@@ -128,7 +165,47 @@ fn surface(text: SurfaceText, title: &str) -> Result<NamedSurface, ReadError> {
     given(&knots_v, n_v, "v")?;
     let points = points.into_iter().map(DVec3::from).collect();
     let surface = BsplineSurface::new(knots_u, knots_v, points, weights).map_err(refused)?;
-    Ok(NamedSurface { name: text.name, surface })
+    let trim = trim(text.trims, &surface).map_err(|error| {
+        let message = error.to_string();
+        let (what, mend) = message.split_once("; ").unwrap_or((&message, "correct the trims"));
+        ReadError::content(format!("{title}: {what}"), mend)
+    })?;
+    let color = text.color.map(|(r, g, b)| [r, g, b]);
+    Ok(NamedSurface { trim, color, ..NamedSurface::new(text.name, surface) })
+}
+
+fn trim(loops: Vec<Vec<TrimText>>, surface: &BsplineSurface) -> Result<Option<Trim>, TrimError> {
+    if loops.is_empty() {
+        return Ok(None);
+    }
+    let curve = |degree: usize, knots: Option<Vec<f64>>, points: Vec<DVec3>, weights| {
+        let degree = Degree::new(degree).map_err(SplineError::from)?;
+        let knots = match knots {
+            Some(knots) => KnotVector::new(degree, knots),
+            None => KnotVector::clamped_uniform(degree, points.len()),
+        };
+        BsplineCurve::new(knots.map_err(SplineError::from)?, points, weights)
+    };
+    let [(u0, u1), (v0, v1)] = [surface.knots_u().domain(), surface.knots_v().domain()];
+    let slack = SAME_CORNER * (u1 - u0).max(v1 - v0);
+    let mut made = Vec::with_capacity(loops.len());
+    for texts in loops {
+        let mut curves = Vec::with_capacity(texts.len());
+        for text in texts {
+            let flat = text.points.into_iter().map(|(u, v)| DVec3::new(u, v, 0.0)).collect();
+            let parameters = curve(text.degree, text.knots, flat, text.weights)?;
+            let edge = match text.edge {
+                None => None,
+                Some(edge) => {
+                    let points = edge.points.into_iter().map(DVec3::from).collect();
+                    Some(curve(edge.degree, edge.knots, points, edge.weights)?)
+                }
+            };
+            curves.push(TrimCurve { parameters, edge });
+        }
+        made.push(TrimLoop::new(curves, slack)?);
+    }
+    Trim::new(made).map(Some)
 }
 
 /// Rows of equal, positive length as one list, and that length.
@@ -173,6 +250,8 @@ pub fn write_scene(model: &Model) -> Result<String, ron::Error> {
             .surface
             .weights()
             .map(|weights| weights.chunks(named.surface.n_v()).map(<[f64]>::to_vec).collect()),
+        color: named.color.map(|[r, g, b]| (r, g, b)),
+        trims: named.trim.as_ref().map(trim_texts).unwrap_or_default(),
     });
     let grids = model
         .grids
@@ -184,6 +263,31 @@ pub fn write_scene(model: &Model) -> Result<String, ron::Error> {
         known => known.to_string(),
     };
     to_ron(&Scene { unit, surfaces: surfaces.collect(), grids: grids.collect() })
+}
+
+fn trim_texts(trim: &Trim) -> Vec<Vec<TrimText>> {
+    let text = |curve: &TrimCurve| {
+        let c = &curve.parameters;
+        TrimText {
+            degree: c.knots().degree().get(),
+            knots: listed_knots(c.knots()),
+            points: c.control_points().iter().map(|p| (p.x, p.y)).collect(),
+            weights: c.weights().map(<[f64]>::to_vec),
+            edge: curve.edge.as_ref().map(|e| EdgeText {
+                degree: e.knots().degree().get(),
+                knots: listed_knots(e.knots()),
+                points: e.control_points().iter().map(|p| (p.x, p.y, p.z)).collect(),
+                weights: e.weights().map(<[f64]>::to_vec),
+            }),
+        }
+    };
+    trim.loops().iter().map(|made| made.curves().iter().map(text).collect()).collect()
+}
+
+/// The knots of a curve, unless they are the default.
+fn listed_knots(knots: &KnotVector) -> Option<Vec<f64>> {
+    let uniform = KnotVector::clamped_uniform(knots.degree(), knots.control_count());
+    (uniform.as_ref() != Ok(knots)).then(|| knots.knots().to_vec())
 }
 
 fn points(points: &[DVec3], n_v: usize) -> Vec<Vec<Point>> {
@@ -215,6 +319,28 @@ mod tests {
         assert_eq!(model.unit, LengthUnit::Millimetre);
         assert_eq!(model.surfaces[0].surface.point(0.5, 0.5), DVec3::new(0.5, 0.5, 0.25));
         assert_eq!(read_scene(&write_scene(&model).unwrap()).unwrap(), model);
+    }
+
+    #[test]
+    fn trims_and_colours_come_back() {
+        let triangle = "color: (0.25, 0.5, 1), trims: [[\
+            (degree: 1, points: [(0, 0), (1, 0)]), \
+            (degree: 2, knots: [0, 0, 0, 3, 3, 3], points: [(1, 0), (0.9, 0.7), (0, 1)], \
+             weights: [1, 0.8, 1], edge: (degree: 1, points: [(1, 0, 0), (0, 1, 0)])), \
+            (degree: 1, points: [(0, 1), (0, 0)])]], control_points";
+        let model = read_scene(&BILINEAR.replace("control_points", triangle)).unwrap();
+        let trim = model.surfaces[0].trim.as_ref().unwrap();
+        assert!(trim.contains(0.1, 0.1) && !trim.contains(0.9, 0.9));
+        assert_eq!(read_scene(&write_scene(&model).unwrap()).unwrap(), model);
+        let open = BILINEAR.replace(
+            "control_points",
+            "trims: [[(degree: 1, points: [(0, 0), (1, 0)])]], control_points",
+        );
+        let message = read_scene(&open).unwrap_err().to_string();
+        assert!(
+            message.starts_with("surface `s`: curve 0 ends 1 (in parameters) away"),
+            "{message}"
+        );
     }
 
     #[test]

@@ -2,7 +2,7 @@
 
 use crate::error::ReadError;
 use crate::mesh::Mesh;
-use crate::obj::coordinate;
+use crate::text_number::coordinate;
 use crate::triangulate::triangulate;
 use geom_core::DVec3;
 use std::collections::HashMap;
@@ -143,7 +143,7 @@ impl Soup {
 /// Meshes as triangles in a binary STL file, which has single precision and no unit.
 #[must_use]
 pub fn write_stl(meshes: &[Mesh]) -> Vec<u8> {
-    let mut bytes = b"umbilic".to_vec();
+    let mut bytes = b"Umbilic".to_vec();
     bytes.resize(HEADER + 4, 0);
     let mut count = 0_u32;
     for mesh in meshes {

@@ -1,4 +1,4 @@
-//! Units of length. Coordinates are never rescaled: the unit is only remembered.
+//! Units of length. Coordinates are never rescaled unasked: the unit is only remembered.
 
 use std::fmt;
 
@@ -68,6 +68,26 @@ impl LengthUnit {
         match self {
             Self::Other { metres, .. } => *metres,
             known => NAMED.iter().find(|(unit, ..)| unit == known).map_or(1.0, |(.., m)| *m),
+        }
+    }
+
+    /// What is to be said if numbers in this unit go into a file with this (lower case) extension
+    /// that cannot tell it: nothing for millimetres, which are meant where nothing is said.
+    #[must_use]
+    pub fn lost_in(&self, extension: &str) -> Option<String> {
+        let format = extension.to_uppercase();
+        match (extension, self) {
+            (_, Self::Millimetre) => None,
+            ("obj" | "off" | "stl" | "json" | "csv", _) => {
+                Some(format!("{format} holds no unit of length; its numbers are in {self}"))
+            }
+            ("dxf", _) => Some(format!(
+                "DXF tells the unit of length in a comment only; its numbers are in {self}"
+            )),
+            ("ron" | "ply", Self::Other { name, metres }) => Some(format!(
+                "{format} does not know the unit {name} ({metres} m); its numbers are in that unit"
+            )),
+            _ => None,
         }
     }
 }

@@ -1,7 +1,7 @@
 //! Periodic surfaces in formats that know only open knots: the first control points are repeated
 //! at the end of the net.
 
-use bspline::{BsplineSurface, Degree, KnotVector, SplineError};
+use bspline::{BsplineCurve, BsplineSurface, Degree, KnotVector, SplineError};
 use geom_core::DVec3;
 
 /// Control point numbers as a file lists them: a periodic direction repeats its first ones.
@@ -44,6 +44,28 @@ impl Direction {
     pub(crate) fn control_count(&self) -> usize {
         self.knots.control_count()
     }
+
+    /// Whether the knots repeat, so that repeated control points make the direction periodic.
+    pub(crate) fn may_close(&self) -> bool {
+        self.periodic.is_some()
+    }
+}
+
+/// The curve, periodic if its first control points come back at the end.
+pub(crate) fn unwrap_curve(
+    along: &Direction,
+    points: &[DVec3],
+    weights: Option<&[f64]>,
+) -> Result<BsplineCurve, SplineError> {
+    let repeats = |n: usize| {
+        let same =
+            |a: usize, b: usize| points[a] == points[b] && weights.is_none_or(|w| w[a] == w[b]);
+        points.len() == along.count && (n..points.len()).all(|i| same(i, i - n))
+    };
+    let periodic = along.periodic.clone().filter(|p| repeats(p.control_count()));
+    let knots = periodic.unwrap_or_else(|| along.knots.clone());
+    let kept = knots.control_count().min(points.len());
+    BsplineCurve::new(knots, points[..kept].to_vec(), weights.map(|w| w[..kept].to_vec()))
 }
 
 /// The surface, periodic in the directions where the first control points come back at the end.

@@ -11,7 +11,7 @@ use geom_core::DVec3;
 use std::path::{Path, PathBuf};
 
 fn surfaces() -> Vec<NamedSurface> {
-    let named = |name: &str, surface| NamedSurface { name: name.to_owned(), surface };
+    let named = |name: &str, surface| NamedSurface::new(name, surface);
     vec![
         named("roof", Shape::Roof.surface(9, 8, 4, 3)),
         named("tube", Shape::Tube.surface(9, 8, 3, 4)),
@@ -175,17 +175,20 @@ fn glb_faults_name_place_and_mend() {
         (b"glTF".to_vec(), "byte 0: not a GLB"),
         (Vec::new(), "byte 0: not a GLB"),
         (good[..60].to_vec(), "byte 8: the header announces more"),
-        (change("\"count\":9", "\"count\":4000000000"), "accessor 0 has 4000000000 items"),
-        (change("\"bufferView\":0", "\"bufferView\":77"), "accessor 0 has no data"),
+        (
+            change("\"count\":9", "\"count\":4000000000"),
+            "accessor 0 has 4000000000 items outside its",
+        ),
+        (change("\"bufferView\":0", "\"bufferView\":77"), "`accessors[0].bufferview`: index out"),
         (change("\"POSITION\":0", "\"POSITION\":50"), "accessor 50 is named and not there"),
-        (change("\"mesh\":0", "\"mesh\":3"), "mesh 3 is named and not there"),
+        (change("\"mesh\":0", "\"mesh\":3"), "`nodes[0].mesh`: index out"),
         (
             change("\"mesh\":0", "\"mesh\":0,\"children\":[0]"),
             "node 0 has two parents or is its own",
         ),
-        (change("\"nodes\":[0]", "\"nodes\":[4]"), "node 4 is named and not there"),
-        (change("\"VEC3\"", "\"VEC9\""), "accessor 0 is not of the type VEC3"),
-        (change("\"componentType\":5126", "\"componentType\":1"), "accessor 0 has an unknown"),
+        (change("\"nodes\":[1]", "\"nodes\":[4]"), "`scenes[0].nodes[0]`: index out"),
+        (change("\"VEC3\"", "\"VEC9\""), "`accessors[0].type`: "),
+        (change("\"componentType\":5126", "\"componentType\":1"), "`accessors[0].componenttype`: "),
         (
             change("\"asset\"", "\"extensionsRequired\":[\"KHR_draco\"],\"asset\""),
             "the file needs the extension KHR_draco",
@@ -222,4 +225,19 @@ fn meshes_of_other_programs() {
         let error = exchange::read_model(&folder.join("hostile").join(name)).unwrap_err();
         assert!(error.to_string().starts_with(want), "{name}: {error}");
     }
+}
+
+#[test]
+fn files_that_other_readers_take_are_taken() {
+    let folder = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../../fixtures/read");
+    let read = |name: &str| exchange::read_model(&folder.join(name));
+    let net = &read("tokens-over-lines.off").unwrap().meshes[0];
+    assert_eq!((net.positions.len(), net.faces.len()), (25, 16));
+    assert_eq!(net.faces.get(15), [18, 19, 24, 23]);
+    assert!(!read("upper-case-magic.ply").unwrap().meshes[0].positions.is_empty());
+    let twice = read("dupvert.ply").unwrap_err().to_string();
+    assert_eq!(
+        twice,
+        "line 7: declared before: `element vertex 3`; give every kind of element once"
+    );
 }

@@ -103,7 +103,7 @@ fn faulty_structure() {
         ("(0.,2.,0.));", "(0.,2.,0.);", "line 11: a `;` inside brackets"),
         ("(0.,2.,0.));", "(0.,2.,0.)));", "line 11: a `)` without its `(`"),
         ("'',(0.,2.,0.)", "',(0.,2.,0.)", "line"),
-        ("B_SPLINE_SURFACE_WITH_KNOTS", "PLANE", "the file has no surface; export"),
+        ("B_SPLINE_SURFACE_WITH_KNOTS", "PLANE", "the file has no surface"),
         ("#40,#41", "#40;#41", "line 8: a `;` inside brackets"),
         ("#40,#41", "#40 #41", "line 8: expected `,`"),
         ("'skin',2", "2", "line 8: expected a text in quotes"),

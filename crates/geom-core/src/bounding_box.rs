@@ -27,6 +27,15 @@ impl BoundingBox {
     }
 
     /// The box grown to hold `point`.
+    ///
+    /// # Example
+    /// ```
+    /// use geom_core::{BoundingBox, DVec3};
+    /// let point = BoundingBox { min: DVec3::ONE, max: DVec3::ONE };
+    /// let grown = point.including(DVec3::new(0.0, 3.0, 1.0));
+    /// assert_eq!(grown.size(), DVec3::new(1.0, 2.0, 0.0));
+    /// assert_eq!(grown.center(), DVec3::new(0.5, 2.0, 1.0));
+    /// ```
     #[must_use]
     pub fn including(self, point: DVec3) -> Self {
         Self { min: self.min.min(point), max: self.max.max(point) }

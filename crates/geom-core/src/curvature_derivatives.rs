@@ -29,6 +29,21 @@ impl SurfaceJet {
     ///
     /// # Errors
     /// [`CurvatureError::Singular`] where the tangents are parallel or vanish.
+    ///
+    /// # Example
+    /// ```
+    /// use geom_core::{CurvatureError, DVec3, SurfaceJet};
+    /// // The cylinder z = x² / 2 + x³ / 6 at x = 0, of curvature 1 that grows at rate 1.
+    /// let mut jet = SurfaceJet::default();
+    /// jet.derivatives[SurfaceJet::index(1, 0)] = DVec3::X;
+    /// jet.derivatives[SurfaceJet::index(0, 1)] = DVec3::Y;
+    /// jet.derivatives[SurfaceJet::index(2, 0)] = DVec3::Z;
+    /// jet.derivatives[SurfaceJet::index(3, 0)] = DVec3::Z;
+    /// let change = jet.curvature_derivatives()?;
+    /// assert_eq!((change.h, change.h_u, change.h_v), (0.5, 0.5, 0.0));
+    /// assert_eq!((change.k, change.k_u), (0.0, 0.0));
+    /// # Ok::<(), CurvatureError>(())
+    /// ```
     pub fn curvature_derivatives(&self) -> Result<CurvatureDerivatives, CurvatureError> {
         let first = self.first_form();
         first.check()?;

@@ -51,6 +51,13 @@ impl CurvatureStatistics {
         };
     }
 
+    /// The same statistics of a model that stands elsewhere.
+    #[must_use]
+    pub fn moved(self, by: DVec3) -> Self {
+        let moved = |b: BoundingBox| BoundingBox { min: b.min + by, max: b.max + by };
+        Self { bounding_box: self.bounding_box.map(moved), ..self }
+    }
+
     /// Adds area that may or may not have curvatures.
     pub fn add_area(&mut self, area: f64) {
         self.area += area;
@@ -77,6 +84,21 @@ impl CurvatureStatistics {
     }
 
     /// Adds the samples of another surface.
+    ///
+    /// # Example
+    /// ```
+    /// use geom_core::{CurvatureStatistics, DVec3};
+    /// let patch = |area: f64, h: f64| {
+    ///     let mut patch = CurvatureStatistics::default();
+    ///     patch.add_area(area);
+    ///     patch.add(DVec3::ZERO, area, h, h * h);
+    ///     patch
+    /// };
+    /// let mut both = patch(1.0, -1.0); // of two spheres
+    /// both.merge(&patch(3.0, -0.5));
+    /// let h = both.mean_curvature().expect("samples");
+    /// assert_eq!((both.area, h.min, h.max, h.mean_abs), (4.0, -1.0, -0.5, 0.625));
+    /// ```
     pub fn merge(&mut self, other: &Self) {
         self.area += other.area;
         self.samples += other.samples;

@@ -7,6 +7,13 @@ use glam::{DVec2, DVec3};
 pub const SINGULAR_RATIO: f64 = 1e-13;
 
 /// Why a curvature has no value.
+///
+/// # Example
+/// ```
+/// use geom_core::{CurvatureError, DVec3, FirstForm};
+/// let pole = FirstForm::from_tangents(DVec3::X, DVec3::ZERO);
+/// assert_eq!(pole.check(), Err(CurvatureError::Singular { e: 1.0, f: 0.0, g: 0.0 }));
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 #[expect(missing_docs, reason = "the messages spell out every field")]
@@ -20,6 +27,17 @@ pub enum CurvatureError {
 }
 
 /// Coefficients `E = S_u·S_u`, `F = S_u·S_v`, `G = S_v·S_v` of the first fundamental form.
+///
+/// # Example
+/// ```
+/// use geom_core::{DVec2, DVec3, FirstForm};
+/// // A plane with oblique tangents: the parallelogram they span has area 2.
+/// let first = FirstForm::from_tangents(DVec3::new(2.0, 0.0, 0.0), DVec3::new(1.0, 1.0, 0.0));
+/// assert_eq!(first.determinant().sqrt(), 2.0);
+/// // The diagonal S_u + S_v = (3, 1, 0).
+/// let diagonal = DVec2::new(1.0, 1.0);
+/// assert_eq!(first.dot(diagonal, diagonal), 10.0);
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FirstForm {
     /// `S_u · S_u`.
@@ -139,6 +157,17 @@ pub fn gaussian_curvature(first: FirstForm, second: SecondForm) -> Result<f64, C
 ///
 /// # Errors
 /// [`CurvatureError::Singular`] at a singular point or for a direction of zero length.
+///
+/// # Example
+/// ```
+/// use geom_core::{CurvatureError, DVec2, FirstForm, SecondForm, normal_curvature};
+/// let first = FirstForm { e: 1.0, f: 0.0, g: 4.0 };
+/// let second = SecondForm { l: 0.0, m: 0.0, n: -2.0 }; // cylinder of radius 2, v around it
+/// let along = |x, y| normal_curvature(first, second, DVec2::new(x, y));
+/// assert_eq!((along(1.0, 0.0)?, along(0.0, 1.0)?), (0.0, -0.5));
+/// assert_eq!(along(2.0, 1.0)?, -0.25); // at 45° to the axis: Euler's cos² 45° of −1/2
+/// # Ok::<(), CurvatureError>(())
+/// ```
 pub fn normal_curvature(
     first: FirstForm,
     second: SecondForm,
@@ -205,6 +234,19 @@ pub fn principal_curvatures(
 ///
 /// # Errors
 /// [`CurvatureError::Singular`] if `E G − F² ≤ SINGULAR_RATIO · E G`.
+///
+/// # Example
+/// ```
+/// use geom_core::{CurvatureError, FirstForm, SecondForm, asymptotic_directions, normal_curvature};
+/// let first = FirstForm { e: 1.0, f: 0.0, g: 1.0 };
+/// let saddle = SecondForm { l: 3.0, m: 0.0, n: -1.0 }; // z = (3 x² − y²) / 2
+/// let [left, right] = asymptotic_directions(first, saddle)?.expect("K < 0");
+/// assert!((left.x.abs() - 0.5).abs() < 1e-15 && (right.y.abs() - 0.75_f64.sqrt()).abs() < 1e-15);
+/// assert!(normal_curvature(first, saddle, left)?.abs() < 1e-15);
+/// let bowl = SecondForm { l: 3.0, m: 0.0, n: 1.0 };
+/// assert_eq!(asymptotic_directions(first, bowl)?, None);
+/// # Ok::<(), CurvatureError>(())
+/// ```
 pub fn asymptotic_directions(
     first: FirstForm,
     second: SecondForm,

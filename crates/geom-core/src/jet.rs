@@ -7,6 +7,20 @@ use glam::DVec3;
 ///
 /// Derivatives stand in the order `S, S_u, S_v, S_uu, S_uv, S_vv, S_uuu, S_uuv, …`; entries beyond
 /// the order that was asked for are zero.
+///
+/// # Example
+/// ```
+/// use geom_core::{CurvatureError, DVec3, SurfaceJet};
+/// // The paraboloid z = (x² + 3 y²) / 2 at its vertex.
+/// let mut jet = SurfaceJet::default();
+/// jet.derivatives[SurfaceJet::index(1, 0)] = DVec3::X;
+/// jet.derivatives[SurfaceJet::index(0, 1)] = DVec3::Y;
+/// jet.derivatives[SurfaceJet::index(2, 0)] = DVec3::Z;
+/// jet.derivatives[SurfaceJet::index(0, 2)] = 3.0 * DVec3::Z;
+/// assert_eq!(jet.normal()?, DVec3::Z);
+/// assert_eq!((jet.mean_curvature()?, jet.gaussian_curvature()?), (2.0, 3.0));
+/// # Ok::<(), CurvatureError>(())
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SurfaceJet {
     /// `derivatives[SurfaceJet::index(a, b)]` is the derivative `a` times in u and `b` times in v.

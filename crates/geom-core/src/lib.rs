@@ -6,10 +6,12 @@
 mod bounding_box;
 mod curvature_derivatives;
 mod curvature_statistics;
+mod enclosing_ball;
 mod forms;
 mod isolines;
 mod jet;
 mod mesh_curvature;
+mod normalization;
 mod poly_mesh;
 mod quad_grid;
 mod third_order;
@@ -19,6 +21,7 @@ mod tri_mesh;
 pub use bounding_box::BoundingBox;
 pub use curvature_derivatives::CurvatureDerivatives;
 pub use curvature_statistics::{CurvatureStatistics, ValueRange};
+pub use enclosing_ball::Ball;
 pub use forms::{
     CurvatureError, FirstForm, PrincipalCurvatures, SINGULAR_RATIO, SecondForm,
     asymptotic_directions, gaussian_curvature, gradient_norm_squared, mean_curvature,
@@ -28,6 +31,7 @@ pub use glam::{DMat3, DVec2, DVec3};
 pub use isolines::{Isoline, isolines};
 pub use jet::SurfaceJet;
 pub use mesh_curvature::{VertexCurvature, mesh_curvature_statistics, vertex_curvatures};
+pub use normalization::{Normalization, NormalizationError};
 pub use numerics::assert_close;
 pub use poly_mesh::{FaceId, HalfEdgeId, MeshError, PolyMesh, VertexId};
 pub use quad_grid::{GridError, QuadGrid};

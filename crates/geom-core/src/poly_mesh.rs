@@ -40,6 +40,18 @@ impl HalfEdgeId {
 }
 
 /// Why a list of faces is not a mesh this crate can work on.
+///
+/// # Example
+/// ```
+/// use geom_core::{DVec3, PolyMesh};
+/// let corners = vec![DVec3::ZERO, DVec3::X, DVec3::Y, DVec3::Z];
+/// let fault = PolyMesh::new(corners, &[[0, 1, 2], [0, 1, 3]]).unwrap_err();
+/// assert_eq!(
+///     fault.to_string(),
+///     "faces 0 and 1 both run from vertex 0 to 1; \
+///      flip one of them so that all faces are oriented alike"
+/// );
+/// ```
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 #[expect(missing_docs, reason = "the messages spell out every field")]
@@ -86,6 +98,23 @@ const NAMED_FACES: usize = 8;
 /// Half-edges of faces come first, face by face and in the order of its corners, so that
 /// `face_half_edge(f)` starts at the first corner given; the half-edges along the boundary
 /// follow. Positions may be changed freely, the connectivity never changes.
+///
+/// # Example
+/// ```
+/// use geom_core::{DVec3, PolyMesh, VertexId};
+/// let corners = vec![DVec3::ZERO, DVec3::X, DVec3::Y, DVec3::Z];
+/// let tetrahedron = PolyMesh::new(corners, &[[0, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3]])?;
+/// assert_eq!((tetrahedron.edge_count(), tetrahedron.euler_characteristic()), (6, 2));
+/// assert!(!tetrahedron.is_boundary_vertex(VertexId(0)));
+/// // Edges as pairs of points, to draw them.
+/// let length = |h| {
+///     let (from, to) = (tetrahedron.origin(h), tetrahedron.target(h));
+///     tetrahedron.position(from).distance(tetrahedron.position(to))
+/// };
+/// let total: f64 = tetrahedron.edges().map(length).sum();
+/// assert!((total - (3.0 + 3.0 * 2.0_f64.sqrt())).abs() < 1e-14);
+/// # Ok::<(), geom_core::MeshError>(())
+/// ```
 #[derive(Clone, Debug, PartialEq)]
 pub struct PolyMesh {
     positions: Vec<DVec3>,
@@ -329,6 +358,16 @@ impl PolyMesh {
     }
 
     /// Corners of a face, in the order given to `new`.
+    ///
+    /// # Example
+    /// ```
+    /// use geom_core::{DVec3, FaceId, PolyMesh};
+    /// let corners = vec![DVec3::ZERO, DVec3::X, DVec3::X + DVec3::Y, DVec3::Y];
+    /// let quad = PolyMesh::new(corners, &[[0, 1, 2, 3]])?;
+    /// let centre = quad.face_vertices(FaceId(0)).map(|v| quad.position(v)).sum::<DVec3>() / 4.0;
+    /// assert_eq!(centre, DVec3::new(0.5, 0.5, 0.0));
+    /// # Ok::<(), geom_core::MeshError>(())
+    /// ```
     #[must_use]
     pub fn face_vertices(&self, f: FaceId) -> FaceCorners<'_> {
         let range = self.face_start[f.index()] as usize..self.face_start[f.index() + 1] as usize;
@@ -357,6 +396,22 @@ impl PolyMesh {
 
     /// Half-edges that leave `v`, clockwise (each one is `next(twin(..))` of the one before); at
     /// the boundary the first runs along the boundary loop.
+    ///
+    /// # Example
+    /// ```
+    /// use geom_core::{DVec3, PolyMesh, VertexId};
+    /// use std::f64::consts::{FRAC_PI_2, TAU};
+    /// // The angle that three right angles at the corner of a tetrahedron lack.
+    /// let corners = vec![DVec3::ZERO, DVec3::X, DVec3::Y, DVec3::Z];
+    /// let mesh = PolyMesh::new(corners, &[[0, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3]])?;
+    /// let angle = |h| {
+    ///     let (after, before) = (mesh.target(h), mesh.origin(mesh.prev(h)));
+    ///     mesh.position(after).angle_between(mesh.position(before))
+    /// };
+    /// let sum: f64 = mesh.outgoing_half_edges(VertexId(0)).map(angle).sum();
+    /// assert!((TAU - sum - FRAC_PI_2).abs() < 1e-14);
+    /// # Ok::<(), geom_core::MeshError>(())
+    /// ```
     pub fn outgoing_half_edges(&self, v: VertexId) -> impl Iterator<Item = HalfEdgeId> + '_ {
         let first = self.outgoing(v);
         let mut at = first;
@@ -369,6 +424,21 @@ impl PolyMesh {
     }
 
     /// Neighbours of `v` along edges, in the order of [`Self::outgoing_half_edges`].
+    ///
+    /// # Example
+    /// ```
+    /// use geom_core::{DVec3, PolyMesh, VertexId};
+    /// // A roof of four triangles over a square, smoothed at its apex.
+    /// let base = [DVec3::ZERO, DVec3::X, DVec3::X + DVec3::Y, DVec3::Y];
+    /// let corners = [&base[..], &[DVec3::new(0.3, 0.6, 1.0)]].concat();
+    /// let mut roof = PolyMesh::new(corners, &[[0, 1, 4], [1, 2, 4], [2, 3, 4], [3, 0, 4]])?;
+    /// let apex = VertexId(4);
+    /// let sum: DVec3 = roof.ring(apex).map(|v| roof.position(v)).sum();
+    /// let mean = sum / roof.valence(apex) as f64;
+    /// roof.positions_mut()[apex.index()] = mean;
+    /// assert_eq!(roof.position(apex), DVec3::new(0.5, 0.5, 0.0));
+    /// # Ok::<(), geom_core::MeshError>(())
+    /// ```
     pub fn ring(&self, v: VertexId) -> impl Iterator<Item = VertexId> + '_ {
         self.outgoing_half_edges(v).map(|h| self.target(h))
     }
@@ -445,6 +515,17 @@ impl PolyMesh {
     }
 
     /// The half-edge from `from` to `to`, if there is an edge.
+    ///
+    /// # Example
+    /// ```
+    /// use geom_core::{DVec3, FaceId, PolyMesh, VertexId};
+    /// let corners = vec![DVec3::ZERO, DVec3::X, DVec3::X + DVec3::Y, DVec3::Y];
+    /// let quad = PolyMesh::new(corners, &[[0, 1, 2, 3]])?;
+    /// let side = quad.half_edge_between(VertexId(0), VertexId(1)).expect("a side");
+    /// assert_eq!((quad.face(side), quad.face(quad.twin(side))), (Some(FaceId(0)), None));
+    /// assert_eq!(quad.half_edge_between(VertexId(0), VertexId(2)), None); // a diagonal
+    /// # Ok::<(), geom_core::MeshError>(())
+    /// ```
     #[must_use]
     pub fn half_edge_between(&self, from: VertexId, to: VertexId) -> Option<HalfEdgeId> {
         self.outgoing_half_edges(from).find(|&h| self.target(h) == to)

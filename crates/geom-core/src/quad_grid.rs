@@ -49,6 +49,20 @@ impl QuadGrid {
     ///
     /// # Errors
     /// [`GridError`] names the first face or vertex that fits in no grid.
+    ///
+    /// # Example
+    /// ```
+    /// use geom_core::{DVec3, PolyMesh, QuadGrid};
+    /// // Two quads side by side.
+    /// let at = |x: u32, y: u32| DVec3::new(f64::from(x), f64::from(y), 0.0);
+    /// let points = vec![at(0, 0), at(1, 0), at(2, 0), at(0, 1), at(1, 1), at(2, 1)];
+    /// let mesh = PolyMesh::new(points, &[[0, 1, 4, 3], [1, 2, 5, 4]])?;
+    /// let grid = QuadGrid::of(&mesh)?;
+    /// assert_eq!((grid.n_u, grid.n_v, grid.closed_u), (3, 2, false));
+    /// let numbers: Vec<u32> = grid.vertices.iter().map(|v| v.0).collect();
+    /// assert_eq!(numbers, [0, 3, 1, 4, 2, 5]);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
     pub fn of(mesh: &PolyMesh) -> Result<Self, GridError> {
         for f in mesh.faces() {
             let corners = mesh.face_degree(f);

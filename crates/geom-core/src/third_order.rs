@@ -15,6 +15,20 @@ use std::f64::consts::FRAC_PI_2;
 ///
 /// All formulas avoid angles except for display. Where the printed formulas are wrong (Joshi 2008,
 /// Eqs. 3.26 and 3.36: the roles of the angles, an extra quarter) these are the corrected ones.
+///
+/// # Example
+/// ```
+/// use geom_core::{CurvatureError, DVec3, SurfaceJet, ThirdOrder};
+/// // The cylinder z = x³ / 6: along x the curvature grows at rate 1, along y it does not change.
+/// let mut jet = SurfaceJet::default();
+/// jet.derivatives[SurfaceJet::index(1, 0)] = DVec3::X;
+/// jet.derivatives[SurfaceJet::index(0, 1)] = DVec3::Y;
+/// jet.derivatives[SurfaceJet::index(3, 0)] = DVec3::Z;
+/// let shape = ThirdOrder::new(&jet)?;
+/// assert_eq!((shape.inline_derivative(0.0), shape.cubic), (1.0, [1.0, 0.0, 0.0, 0.0]));
+/// assert_eq!((shape.f1(), shape.f3()), (0.75, 0.25)); // cos³ = (3 cos + cos 3·) / 4
+/// # Ok::<(), CurvatureError>(())
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ThirdOrder {
     /// First tangent, along `S_u`.
@@ -186,6 +200,16 @@ impl ThirdOrder {
     /// It is a star if and only if `3 F3 > F1`; otherwise a monstar if the cubic form has six
     /// extrema around the circle and a lemon if it has two. (Joshi 2008, sec. 3.7.3 puts six zero
     /// crossings in place of the first condition, which is sufficient but not necessary.)
+    ///
+    /// # Example
+    /// ```
+    /// use geom_core::{DMat3, DVec3, ThirdOrder, UmbilicKind};
+    /// // The monkey saddle z = (x³ − 3 x y²) / 6.
+    /// let DMat3 { x_axis: e1, y_axis: e2, .. } = DMat3::IDENTITY;
+    /// let monkey = ThirdOrder { e1, e2, second: [0.0; 3], cubic: [1.0, 0.0, -1.0, 0.0] };
+    /// assert_eq!(monkey.umbilic_kind(), UmbilicKind::Star);
+    /// assert_eq!(e1.cross(e2), DVec3::Z);
+    /// ```
     #[must_use]
     pub fn umbilic_kind(&self) -> UmbilicKind {
         if 3.0 * self.f3() > self.f1() {

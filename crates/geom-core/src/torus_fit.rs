@@ -31,6 +31,15 @@ impl Torus {
     }
 
     /// Signed distance of a point from the torus, positive outside the tube.
+    ///
+    /// # Example
+    /// ```
+    /// use geom_core::{DVec3, Torus};
+    /// let (centre, axis) = (DVec3::ZERO, DVec3::Z);
+    /// let ring = Torus { centre, axis, major_radius: 2.0, minor_radius: 0.5 };
+    /// assert_eq!(ring.distance(DVec3::new(3.0, 0.0, 0.0)), 0.5);
+    /// assert_eq!(ring.distance(DVec3::new(0.0, 2.0, 0.0)), -0.5);
+    /// ```
     #[must_use]
     pub fn distance(&self, point: DVec3) -> f64 {
         let height = self.axis.dot(point - self.centre);

@@ -13,6 +13,22 @@ pub struct Foot {
 }
 
 /// A surface that knows its nearest point: a mesh, or a closed form.
+///
+/// # Example
+/// ```
+/// use geom_core::{ClosestPoint, DVec3, Foot};
+/// /// The unit sphere, in closed form.
+/// struct Sphere;
+///
+/// impl ClosestPoint for Sphere {
+///     fn closest_point(&self, x: DVec3) -> Foot {
+///         let normal = x.normalize_or(DVec3::Z);
+///         Foot { point: normal, normal }
+///     }
+/// }
+///
+/// assert_eq!(Sphere.closest_point(DVec3::new(0.0, -3.0, 0.0)).point, -DVec3::Y);
+/// ```
 pub trait ClosestPoint: Send + Sync {
     /// The foot of `x`.
     fn closest_point(&self, x: DVec3) -> Foot;
@@ -87,13 +103,27 @@ impl TriMesh {
 
     /// The triangles of a polygon mesh: quads are cut along the shorter diagonal, larger faces
     /// fanned from their first corner. Vertices keep their numbers.
+    ///
+    /// # Example
+    /// ```
+    /// use geom_core::{DVec3, PolyMesh, TriMesh};
+    /// // A rhombus, twice as long as wide.
+    /// let corners = vec![-2.0 * DVec3::X, -DVec3::Y, 2.0 * DVec3::X, DVec3::Y];
+    /// let rhombus = PolyMesh::new(corners, &[[0, 1, 2, 3]])?;
+    /// assert_eq!(TriMesh::from_poly_mesh(&rhombus).triangles(), [[0, 1, 3], [1, 2, 3]]);
+    /// # Ok::<(), geom_core::MeshError>(())
+    /// ```
     #[must_use]
     pub fn from_poly_mesh(mesh: &PolyMesh) -> Self {
         let mut triangles = Vec::with_capacity(2 * mesh.face_count());
         for f in mesh.faces() {
             let c: Vec<u32> = mesh.face_vertices(f).map(|v| v.0).collect();
             let at = |k: usize| mesh.positions()[c[k] as usize];
-            if c.len() == 4 && at(1).distance_squared(at(3)) < at(0).distance_squared(at(2)) {
+            // Of diagonals equal but for rounding always the same one, however the mesh is turned.
+            let clearly = 1.0 - 1e-9;
+            if c.len() == 4
+                && at(1).distance_squared(at(3)) < clearly * at(0).distance_squared(at(2))
+            {
                 triangles.push([c[0], c[1], c[3]]);
                 triangles.push([c[1], c[2], c[3]]);
             } else {
@@ -102,6 +132,16 @@ impl TriMesh {
         }
         Self::new(mesh.positions().to_vec(), triangles)
             .expect("a polygon mesh has finite coordinates, at least one face, and sound corners")
+    }
+
+    /// The same triangles with every position mapped.
+    ///
+    /// # Panics
+    /// If a position is mapped to one that is not finite.
+    #[must_use]
+    pub fn mapped(&self, map: impl Fn(DVec3) -> DVec3) -> Self {
+        let positions = self.positions.iter().map(|&p| map(p)).collect();
+        Self::new(positions, self.triangles.clone()).expect("finite positions, the same triangles")
     }
 
     /// Positions, indexed by vertex.
@@ -236,6 +276,14 @@ impl Node {
 /// Barycentric coordinates of the point of a triangle nearest to `x` (Ericson 2004, §5.1.5).
 ///
 /// A triangle without area is treated as its longest edge.
+///
+/// # Example
+/// ```
+/// use geom_core::{DVec3, closest_barycentric};
+/// let corners = [DVec3::ZERO, DVec3::X, DVec3::Y];
+/// let beyond_the_long_side = DVec3::new(1.0, 1.0, 5.0);
+/// assert_eq!(closest_barycentric(beyond_the_long_side, corners), [0.0, 0.5, 0.5]);
+/// ```
 #[must_use]
 pub fn closest_barycentric(x: DVec3, corners: [DVec3; 3]) -> [f64; 3] {
     let [a, b, c] = corners;
@@ -278,6 +326,14 @@ pub fn closest_barycentric(x: DVec3, corners: [DVec3; 3]) -> [f64; 3] {
 }
 
 /// The point of segment `a`–`b` nearest to `x`, as its parameter in 0..=1 (0 if `a == b`).
+///
+/// # Example
+/// ```
+/// use geom_core::{DVec3, closest_on_segment};
+/// let (a, b) = (DVec3::ZERO, 4.0 * DVec3::X);
+/// assert_eq!(closest_on_segment(DVec3::new(1.0, 7.0, 0.0), a, b), 0.25);
+/// assert_eq!(closest_on_segment(DVec3::new(9.0, 7.0, 0.0), a, b), 1.0);
+/// ```
 #[must_use]
 pub fn closest_on_segment(x: DVec3, a: DVec3, b: DVec3) -> f64 {
     let d = b - a;

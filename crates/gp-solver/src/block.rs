@@ -117,6 +117,36 @@ pub trait ResidualBlock: Send + Sync {
 /// worth of Hessian, that is `push(columns, columns.len())`, so that `jacobian_range` describes
 /// the row-major square Hessian and `rows` the gradient. The promises are those of
 /// [`ResidualBlock`]; the weight of the block multiplies the energy.
+///
+/// # Example
+/// ```
+/// use gp_solver::{Elements, EnergyBlock, Options, Problem, check_gradient, solve};
+///
+/// /// `cosh(x − 3)` of the first unknown.
+/// struct Bowl(Elements);
+///
+/// impl EnergyBlock for Bowl {
+///     fn name(&self) -> &str { "bowl" }
+///     fn elements(&self) -> &Elements { &self.0 }
+///     fn energy(&self, x: &[f64]) -> f64 { (x[0] - 3.0).cosh() }
+///     fn quadratic_model(&self, x: &[f64], gradients: &mut [f64], hessians: &mut [f64]) -> f64 {
+///         gradients[0] = (x[0] - 3.0).sinh();
+///         hessians[0] = (x[0] - 3.0).cosh();
+///         self.energy(x)
+///     }
+/// }
+///
+/// let mut elements = Elements::new();
+/// elements.push(&[0], 1); // one column, hence one row
+/// let bowl = Bowl(elements);
+/// assert!(check_gradient(&bowl, &[1.0])?.expect("derivatives").error < 1e-8);
+/// let mut problem = Problem::new(1);
+/// problem.add_energy(bowl);
+/// let mut x = [0.0];
+/// solve(problem, &mut x, &Options::default())?;
+/// assert!((x[0] - 3.0).abs() < 1e-6);
+/// # Ok::<(), gp_solver::SolverError>(())
+/// ```
 pub trait EnergyBlock: Send + Sync {
     /// The name its energy has in the report.
     fn name(&self) -> &str;

@@ -10,6 +10,16 @@ use crate::error::SolverError;
 ///
 /// What is kept is for the method to say: named vectors of numbers (iterates, dampings, memories)
 /// and of counts. The fingerprint ties it to its input and options.
+///
+/// # Example
+/// ```
+/// use gp_solver::Checkpoint;
+/// let state = Checkpoint::new("fit", 42, 0, 7).with_numbers("x", &[1.0, 2.0]);
+/// assert_eq!(state.numbers("x", 2)?, [1.0, 2.0]);
+/// assert!(state.numbers("x", 3).is_err()); // a run of another size
+/// assert!(state.check("fit", 42).is_ok() && state.check("fit", 43).is_err());
+/// # Ok::<(), gp_solver::SolverError>(())
+/// ```
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Checkpoint {

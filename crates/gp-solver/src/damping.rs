@@ -4,6 +4,19 @@ use crate::least_squares::{StepModel, System};
 
 /// Rule by which the damping `μ` changes from step to step; `ϱ` is the actual over the predicted
 /// decrease of a step.
+///
+/// # Example
+/// ```
+/// use gp_solver::{Closeness, DampingRule, Options, Problem, solve};
+/// let mut problem = Problem::new(1);
+/// problem.add(Closeness::new("target", vec![4.0], vec![1.0]));
+/// let options = Options { damping_rule: DampingRule::Fivefold, ..Options::default() };
+/// let report = solve(problem, &mut [0.0], &options)?;
+/// // Every step of a linear problem succeeds, and each divides the damping by five.
+/// let damping: Vec<f64> = report.history.iter().map(|step| step.damping).collect();
+/// assert!((damping[1] - 1e-3).abs() < 1e-15 && (damping[2] - 2e-4).abs() < 1e-15);
+/// # Ok::<(), gp_solver::SolverError>(())
+/// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum DampingRule {

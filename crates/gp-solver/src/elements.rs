@@ -9,6 +9,17 @@ use std::ops::Range;
 /// element. The Jacobian of element `e` is a dense row-major block of
 /// `rows(e).len() × columns(e).len()` values; the blocks of all elements follow one another in
 /// one slice, `jacobian_range(e)` says where.
+///
+/// # Example
+/// ```
+/// use gp_solver::Elements;
+/// // Two edges of a chain of points in the plane, two rows for each.
+/// let mut edges = Elements::new();
+/// edges.push(&[0, 1, 2, 3], 2);
+/// edges.push(&[2, 3, 4, 5], 2);
+/// assert_eq!((edges.len(), edges.rows_total(), edges.jacobian_len()), (2, 4, 16));
+/// assert_eq!((edges.rows(1), edges.jacobian_range(1)), (2..4, 8..16));
+/// ```
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Elements {
     columns: Vec<usize>,

@@ -4,6 +4,19 @@ use std::fmt;
 
 /// What makes it impossible to attempt a solve. Ending early is not an error but a
 /// [`Status`](crate::Status).
+///
+/// # Example
+/// ```
+/// use gp_solver::{Closeness, Factorization, Problem, System};
+/// let mut problem = Problem::new(1);
+/// problem.add(Closeness::new("target", vec![1.0, 2.0], vec![1.0, 1.0])); // of two unknowns
+/// let fault = System::new(problem, Factorization::Auto).err().expect("there is only one");
+/// assert_eq!(
+///     fault.to_string(),
+///     "block `target`, element 1 reads unknown 1, but there are only 1; \
+///      correct its columns or make the problem larger"
+/// );
+/// ```
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 #[expect(missing_docs, reason = "the messages spell out every field")]

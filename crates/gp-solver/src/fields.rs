@@ -163,6 +163,15 @@ impl ListItem for f64 {
 
 /// Several values: one word with the values between separators, a flag that may be repeated, and
 /// in configuration files such a word or a list of words.
+///
+/// # Example
+/// ```
+/// use gp_solver::{Counts, List, OptionValue};
+/// let levels = List::<Counts>::read("13x10,25x18")?;
+/// assert_eq!((levels.len(), levels[1]), (2, Counts { u: 25, v: 18 }));
+/// assert_eq!(levels.print().as_deref(), Some("13x10,25x18"));
+/// # Ok::<(), String>(())
+/// ```
 #[derive(Clone, Debug, PartialEq)]
 pub struct List<T>(pub Vec<T>);
 
@@ -239,6 +248,14 @@ impl<'de, T: ListItem> Deserialize<'de> for List<T> {
 }
 
 /// Two positive counts, written `25x18`: along u, then along v.
+///
+/// # Example
+/// ```
+/// use gp_solver::{Counts, OptionValue};
+/// assert_eq!(Counts::read("25x18"), Ok(Counts { u: 25, v: 18 }));
+/// assert_eq!(Counts { u: 25, v: 18 }.print().as_deref(), Some("25x18"));
+/// assert!(Counts::read("25").unwrap_err().contains("UxV"));
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Counts {
     /// Along u.

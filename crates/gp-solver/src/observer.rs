@@ -7,6 +7,24 @@ use crate::least_squares::System;
 use crate::schedule::Stage;
 
 /// A run after a step, and once at the start of every stage.
+///
+/// # Example
+/// ```
+/// use gp_solver::{Closeness, Options, Problem, Progress, Status, solve_observed};
+/// use std::ops::ControlFlow;
+/// let mut problem = Problem::new(1);
+/// problem.add(Closeness::new("target", vec![4.0], vec![1.0]));
+/// let mut seen = Vec::new();
+/// let mut first_step_only = |progress: &Progress<'_>| {
+///     seen.push((progress.iteration, progress.energy));
+///     if progress.iteration < 1 { ControlFlow::Continue(()) } else { ControlFlow::Break(()) }
+/// };
+/// let mut x = [0.0];
+/// let report = solve_observed(problem, &mut x, &Options::default(), &mut first_step_only)?;
+/// assert_eq!(report.status, Status::Interrupted);
+/// assert_eq!((seen[0], seen.len()), ((0, 8.0), 2)); // the start, with E = 4² / 2, and one step
+/// # Ok::<(), gp_solver::SolverError>(())
+/// ```
 #[derive(Clone, Copy)]
 pub struct Progress<'s> {
     /// The stage.
@@ -36,6 +54,32 @@ impl Progress<'_> {
 
 /// Watches a run. A closure `FnMut(&Progress) -> ControlFlow<()>` is an observer, `()` one that
 /// lets everything pass.
+///
+/// # Example
+/// ```
+/// use gp_solver::{Checkpoint, Closeness, Observer, Options, Problem, solve_observed};
+///
+/// /// Keeps the newest state, to go on from after a breakdown.
+/// #[derive(Default)]
+/// struct Keeper(Option<Checkpoint>);
+///
+/// impl Observer for Keeper {
+///     fn checkpoint(&mut self, state: &dyn Fn() -> Checkpoint) {
+///         self.0 = Some(state());
+///     }
+///     fn resume(&mut self) -> Option<Checkpoint> {
+///         self.0.clone()
+///     }
+/// }
+///
+/// let mut problem = Problem::new(1);
+/// problem.add(Closeness::new("target", vec![4.0], vec![1.0]));
+/// let (mut x, mut keeper) = ([0.0], Keeper::default());
+/// solve_observed(problem, &mut x, &Options::default(), &mut keeper)?;
+/// let state = keeper.0.expect("one after every step");
+/// assert_eq!(state.numbers("x", 1)?, x);
+/// # Ok::<(), gp_solver::SolverError>(())
+/// ```
 pub trait Observer {
     /// Sees the start of every stage and every step; [`ControlFlow::Break`] stops the run, which
     /// keeps the iterate shown.

@@ -5,6 +5,20 @@ use crate::error::SolverError;
 use crate::linear::Factorization;
 
 /// How a step is made from the linearised problem.
+///
+/// # Example
+/// ```
+/// use gp_solver::{Closeness, Method, Options, Problem, Regularization, solve};
+/// let mut problem = Problem::new(1);
+/// problem.add(Closeness::new("target", vec![4.0], vec![1.0]));
+/// // A linear problem is solved by one step, but for the regularisation.
+/// let method = Method::GaussNewton { regularization: Regularization::Diagonal(1e-12) };
+/// let options = Options { method, max_iterations: 1, ..Options::default() };
+/// let mut x = [0.0];
+/// solve(problem, &mut x, &options)?;
+/// assert!((x[0] - 4.0).abs() < 1e-11);
+/// # Ok::<(), gp_solver::SolverError>(())
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum Method {
@@ -38,6 +52,17 @@ pub enum Regularization {
 
 /// Settings of a least-squares solve. The defaults suit every problem of the published test sets
 /// this crate is proven on.
+///
+/// # Example
+/// ```
+/// use gp_solver::{Closeness, Options, Problem, Status, solve};
+/// let mut problem = Problem::new(1);
+/// problem.add(Closeness::new("target", vec![4.0], vec![1.0]));
+/// let options = Options { max_iterations: 1, gradient_tol: 0.0, ..Options::default() };
+/// let report = solve(problem, &mut [0.0], &options)?;
+/// assert_eq!((report.status, report.iterations), (Status::IterationLimit, 1));
+/// # Ok::<(), gp_solver::SolverError>(())
+/// ```
 #[derive(Clone, Debug, PartialEq)]
 pub struct Options {
     /// Step rule.
@@ -85,6 +110,20 @@ impl Default for Options {
 
 impl Options {
     /// Guided projection as published, with weight `epsilon` of the last iterate.
+    ///
+    /// # Example
+    /// ```
+    /// use gp_solver::{Options, Problem, QuadraticBuilder, solve};
+    /// // A point near the circle of radius 5, brought onto it.
+    /// let mut circle = QuadraticBuilder::new("circle");
+    /// circle.equation(1.0).product(0, 0, 1.0).product(1, 1, 1.0).constant(-25.0);
+    /// let mut problem = Problem::new(2);
+    /// problem.add(circle.build());
+    /// let mut x = [3.3, 4.4];
+    /// solve(problem, &mut x, &Options::guided_projection(1e-3))?;
+    /// assert!((x[0] - 3.0).abs() < 1e-6 && (x[1] - 4.0).abs() < 1e-6);
+    /// # Ok::<(), gp_solver::SolverError>(())
+    /// ```
     #[must_use]
     pub fn guided_projection(epsilon: f64) -> Self {
         Self { method: Method::GuidedProjection { epsilon }, ..Self::default() }

@@ -78,6 +78,18 @@ impl<'a> Problem<'a> {
     ///
     /// # Errors
     /// [`SolverError::NoSuchBlock`].
+    ///
+    /// # Example
+    /// ```
+    /// use gp_solver::{Closeness, Problem};
+    /// let mut problem = Problem::new(1);
+    /// let here = problem.add(Closeness::new("here", vec![1.0], vec![1.0]));
+    /// let there = problem.add(Closeness::new("there", vec![6.0], vec![1.0]));
+    /// problem.remove(here)?;
+    /// assert_eq!(problem.blocks().collect::<Vec<_>>(), [(there, "there")]);
+    /// assert!(problem.weight(here).is_err());
+    /// # Ok::<(), gp_solver::SolverError>(())
+    /// ```
     pub fn remove(&mut self, block: BlockId) -> Result<(), SolverError> {
         self.slot(block)?.block = Block::Removed;
         Ok(())
@@ -87,6 +99,21 @@ impl<'a> Problem<'a> {
     ///
     /// # Errors
     /// [`SolverError::NoSuchBlock`], [`SolverError::BadOption`] unless `0 ≤ weight < ∞`.
+    ///
+    /// # Example
+    /// ```
+    /// use gp_solver::{Closeness, Options, Problem, solve};
+    /// let mut problem = Problem::new(1);
+    /// problem.add(Closeness::new("here", vec![0.0], vec![1.0]));
+    /// let there = problem.add(Closeness::new("there", vec![4.0], vec![1.0]));
+    /// problem.set_weight(there, 3.0)?;
+    /// assert_eq!(problem.weight(there)?, 3.0);
+    /// // Least squares: the squares of the weights share the way.
+    /// let mut x = [0.0];
+    /// solve(problem, &mut x, &Options::default())?;
+    /// assert!((x[0] - 4.0 * 9.0 / (1.0 + 9.0)).abs() < 1e-6);
+    /// # Ok::<(), gp_solver::SolverError>(())
+    /// ```
     pub fn set_weight(&mut self, block: BlockId, weight: f64) -> Result<(), SolverError> {
         if !(weight >= 0.0 && weight.is_finite()) {
             let need = "zero or more, and finite";
@@ -111,6 +138,22 @@ impl<'a> Problem<'a> {
     ///
     /// # Errors
     /// [`SolverError::NoSuchBlock`], [`SolverError::NoReference`].
+    ///
+    /// # Example
+    /// ```
+    /// use gp_solver::{Closeness, Options, Problem, QuadraticBuilder, solve};
+    /// let mut line = QuadraticBuilder::new("line");
+    /// line.equation(1.0).linear(0, 1.0).constant(-2.0);
+    /// let mut problem = Problem::new(1);
+    /// let target = problem.add(Closeness::new("target", vec![0.0], vec![1.0]));
+    /// let line = problem.add(line.build());
+    /// assert!(problem.set_reference(line, &[3.0]).is_err()); // it measures against nothing
+    /// problem.set_reference(target, &[4.0])?;
+    /// let mut x = [0.0];
+    /// solve(problem, &mut x, &Options::default())?;
+    /// assert!((x[0] - 3.0).abs() < 1e-6); // between the line x = 2 and the target
+    /// # Ok::<(), gp_solver::SolverError>(())
+    /// ```
     pub fn set_reference(&mut self, block: BlockId, reference: &[f64]) -> Result<(), SolverError> {
         let slot = self.slot(block)?;
         let done = match &mut slot.block {

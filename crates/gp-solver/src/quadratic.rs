@@ -43,6 +43,21 @@ pub struct QuadraticConstraints {
 
 /// Collects the coefficients of [`QuadraticConstraints`]; start each equation with
 /// [`equation`](Self::equation).
+///
+/// # Example
+/// ```
+/// use gp_solver::{QuadraticBuilder, ResidualBlock};
+/// let mut equations = QuadraticBuilder::new("unit vectors");
+/// for v in 0..2 {
+///     let length = equations.equation(1.0).constant(-1.0);
+///     for c in 3 * v..3 * v + 3 {
+///         length.product(c, c, 1.0);
+///     }
+/// }
+/// let mut rows = [0.0; 2];
+/// equations.build().residuals(&[0.0, 1.0, 0.0, 2.0, 0.0, 1.0], &mut rows);
+/// assert_eq!(rows, [0.0, 4.0]);
+/// ```
 #[derive(Clone, Debug)]
 pub struct QuadraticBuilder {
     name: String,
@@ -196,6 +211,14 @@ impl QuadraticConstraints {
     }
 
     /// The Jacobian at `x` as (equation, unknown, value), weights included.
+    ///
+    /// # Example
+    /// ```
+    /// use gp_solver::QuadraticBuilder;
+    /// let mut hyperbola = QuadraticBuilder::new("hyperbola");
+    /// hyperbola.equation(2.0).product(0, 1, 1.0).constant(-1.0); // 2 (x y − 1)
+    /// assert_eq!(hyperbola.build().triplets(&[3.0, 5.0]), [(0, 0, 10.0), (0, 1, 6.0)]);
+    /// ```
     #[must_use]
     pub fn triplets(&self, x: &[f64]) -> Vec<(usize, usize, f64)> {
         let (mut rows, mut values) = (vec![0.0; self.len()], vec![0.0; self.linear.len()]);
@@ -208,6 +231,16 @@ impl QuadraticConstraints {
     }
 
     /// The Jacobian at `x` as a sparse matrix with a column per unknown, weights included.
+    ///
+    /// # Example
+    /// ```
+    /// use gp_solver::QuadraticBuilder;
+    /// let mut hyperbola = QuadraticBuilder::new("hyperbola");
+    /// hyperbola.equation(1.0).product(0, 2, 1.0).constant(-1.0);
+    /// let jacobian = hyperbola.build().jacobian(&[3.0, 9.0, 5.0]);
+    /// assert_eq!((jacobian.shape(), jacobian.nnz()), ((1, 3), 2));
+    /// assert_eq!(jacobian.get(0, 2), Some(&3.0));
+    /// ```
     #[cfg(feature = "sparse")]
     #[must_use]
     pub fn jacobian(&self, x: &[f64]) -> sprs::CsMat<f64> {

@@ -3,8 +3,14 @@
 use std::fmt;
 use std::time::Duration;
 
-/// How a solve ended. Only the words differ from success to failure: the iterate is usable in
-/// every case.
+/// How a solve or a run ended. The iterate of a solve is usable in every case; a method may look at
+/// its result and find it [`Failed`](Self::Failed).
+///
+/// # Example
+/// ```
+/// use gp_solver::Status;
+/// assert_eq!(Status::IterationLimit.to_string(), "iteration_limit");
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Status {
     /// A stop rule of [`Options`](crate::Options) was met.
@@ -17,6 +23,11 @@ pub enum Status {
     Interrupted,
     /// The constraints contradict one another.
     Infeasible,
+    /// Most of the result is right, and what is not is named.
+    Partial,
+    /// The result is no use: it folds, has spikes or is not finite somewhere between the samples it
+    /// was made from.
+    Failed,
 }
 
 impl Status {
@@ -29,6 +40,35 @@ impl Status {
             Self::IterationLimit => "iteration_limit",
             Self::Interrupted => "interrupted",
             Self::Infeasible => "infeasible",
+            Self::Partial => "partial",
+            Self::Failed => "failed",
+        }
+    }
+}
+
+/// Share of a result that must be right for it to be [`Partial`](Status::Partial) rather than
+/// [`Failed`](Status::Failed).
+const PARTIAL: f64 = 0.95;
+
+impl Status {
+    /// The status of a result of which this share is found to be wrong (folded, crossing itself, not
+    /// finite) when it is looked at more closely: as it was if nothing is wrong or the run was
+    /// interrupted, `Partial` if at least 95 % are right, else `Failed`.
+    ///
+    /// ```
+    /// use gp_solver::Status;
+    /// assert_eq!(Status::Converged.checked(0, 100), Status::Converged);
+    /// assert_eq!(Status::Converged.checked(5, 100), Status::Partial);
+    /// assert_eq!(Status::Stalled.checked(6, 100), Status::Failed);
+    /// ```
+    #[must_use]
+    pub fn checked(self, wrong: usize, of: usize) -> Self {
+        if wrong == 0 || self == Self::Interrupted {
+            self
+        } else if (of.saturating_sub(wrong)) as f64 >= PARTIAL * of as f64 {
+            Self::Partial
+        } else {
+            Self::Failed
         }
     }
 }
@@ -89,6 +129,20 @@ pub struct Timings {
 }
 
 /// What a solve did.
+///
+/// # Example
+/// ```
+/// use gp_solver::{Closeness, Options, Problem, solve};
+/// let mut problem = Problem::new(1);
+/// problem.add(Closeness::new("here", vec![0.0], vec![1.0]));
+/// problem.add(Closeness::new("there", vec![4.0], vec![1.0]));
+/// let report = solve(problem, &mut [0.0], &Options::default())?;
+/// // The mean, 2, is as far from one as from the other.
+/// assert_eq!((report.initial_energy, report.terms[1].name.as_str()), (8.0, "there"));
+/// assert!((report.terms[1].energy - 2.0).abs() < 1e-6);
+/// assert_eq!(report.history.len(), report.iterations + 1);
+/// # Ok::<(), gp_solver::SolverError>(())
+/// ```
 #[derive(Clone, Debug, PartialEq)]
 pub struct Report {
     /// How it ended.

@@ -73,6 +73,24 @@ pub struct StageReport {
 }
 
 /// What a run of several stages did.
+///
+/// # Example
+/// ```
+/// use gp_solver::{
+///     Closeness, Options, Problem, RunReport, SolverError, Stage, StageReport, solve,
+/// };
+/// let stage = |number: usize| {
+///     let mut problem = Problem::new(1);
+///     problem.add(Closeness::new("target", vec![number as f64], vec![1.0]));
+///     let solver = solve(problem, &mut [7.0], &Options::default())?;
+///     let stage = Stage::new(format!("level {number}"), number, 2);
+///     Ok::<_, SolverError>(StageReport { stage, solver })
+/// };
+/// let run = RunReport::of_stages(vec![stage(0)?, stage(1)?]);
+/// assert_eq!(run.status, run.stages[1].solver.status);
+/// assert_eq!(run.iterations, run.stages.iter().map(|s| s.solver.iterations).sum::<usize>());
+/// # Ok::<(), gp_solver::SolverError>(())
+/// ```
 #[derive(Clone, Debug, PartialEq)]
 pub struct RunReport {
     /// How the run ended.

@@ -27,9 +27,21 @@ pub struct Variables {
     scale: Vec<f64>,
     order: Option<Vec<usize>>,
     run: Option<usize>,
+    vectors: Vec<Group>,
 }
 
 /// Where the unknowns of one group stand: `items` of `width` components each.
+///
+/// # Example
+/// ```
+/// use gp_solver::Variables;
+/// let mut variables = Variables::new();
+/// let [points, normals] = variables.interleave(2, [("points", 3), ("normals", 3)]);
+/// let mut x = vec![0.0; variables.len()];
+/// normals.set(&mut x, 1, [0.0, 0.0, 1.0]);
+/// assert_eq!((normals.get(&x, 1), points.get(&x, 1)), ([0.0, 0.0, 1.0], [0.0; 3]));
+/// assert_eq!(x[normals.column(1, 2)], 1.0);
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Group {
     first: usize,
@@ -73,6 +85,16 @@ impl Group {
     }
 
     /// Numbers of the unknowns of an item.
+    ///
+    /// # Example
+    /// ```
+    /// use gp_solver::Variables;
+    /// let mut variables = Variables::new();
+    /// variables.add("time", 1, 1);
+    /// let points = variables.add("points", 4, 3);
+    /// assert_eq!(points.columns::<3>(2), [7, 8, 9]);
+    /// assert_eq!(points.column(2, 1), 8);
+    /// ```
     #[must_use]
     pub fn columns<const W: usize>(self, item: usize) -> [usize; W] {
         debug_assert_eq!(W, self.width, "one number per component");
@@ -87,12 +109,32 @@ impl Group {
     }
 
     /// Sets the value of an item in a vector of all unknowns.
+    ///
+    /// # Example
+    /// ```
+    /// use gp_solver::Variables;
+    /// let mut variables = Variables::new();
+    /// let points = variables.add("points", 2, 3);
+    /// let mut x = vec![0.0; variables.len()];
+    /// points.set(&mut x, 1, [1.0, 2.0, 3.0]);
+    /// assert_eq!(x, [0.0, 0.0, 0.0, 1.0, 2.0, 3.0]);
+    /// assert_eq!(points.get::<3>(&x, 1), [1.0, 2.0, 3.0]);
+    /// ```
     pub fn set<const W: usize>(self, x: &mut [f64], item: usize, value: [f64; W]) {
         let first = self.column(item, 0);
         x[first..first + W].copy_from_slice(&value);
     }
 
     /// The numbers of all unknowns of the group if they follow one another.
+    ///
+    /// # Example
+    /// ```
+    /// use gp_solver::Variables;
+    /// let mut variables = Variables::new();
+    /// let heights = variables.add("heights", 4, 1);
+    /// let [points, _] = variables.interleave(2, [("points", 3), ("normals", 3)]);
+    /// assert_eq!((heights.range(), points.range()), (Some(0..4), None));
+    /// ```
     #[must_use]
     pub fn range(self) -> Option<Range<usize>> {
         (self.stride == self.width || self.items <= 1)
@@ -101,6 +143,19 @@ impl Group {
 
     /// The items for which `keep(i, j)` holds: row and column of a group over a grid, else the
     /// number of the item and 0.
+    ///
+    /// # Example
+    /// ```
+    /// use gp_solver::Variables;
+    /// let mut variables = Variables::new();
+    /// let net = variables.add_grid("control points", [3, 4], 3);
+    /// let border = net.select(|i, j| i == 0 || i == 2 || j == 0 || j == 3);
+    /// assert_eq!(border.len(), 10);
+    /// for item in border {
+    ///     variables.fix(net, item);
+    /// }
+    /// assert_eq!(variables.fixed().iter().filter(|fixed| !**fixed).count(), 2 * 3);
+    /// ```
     #[must_use]
     pub fn select(self, mut keep: impl FnMut(usize, usize) -> bool) -> Vec<usize> {
         (0..self.items).filter(|k| keep(k / self.columns, k % self.columns)).collect()
@@ -180,6 +235,19 @@ impl Variables {
     ///
     /// # Errors
     /// [`SolverError::NoSuchGroup`] lists the names there are.
+    ///
+    /// # Example
+    /// ```
+    /// use gp_solver::Variables;
+    /// let mut variables = Variables::new();
+    /// variables.add("points", 5, 3);
+    /// assert_eq!(variables.group("points")?.len(), 5);
+    /// assert_eq!(
+    ///     variables.group("normals").unwrap_err().to_string(),
+    ///     "there is no group of unknowns `normals`; there are: points"
+    /// );
+    /// # Ok::<(), gp_solver::SolverError>(())
+    /// ```
     pub fn group(&self, name: &str) -> Result<Group, SolverError> {
         let found = self.groups.iter().find(|(n, _)| n == name);
         found.map(|(_, group)| *group).ok_or_else(|| SolverError::NoSuchGroup {
@@ -197,6 +265,23 @@ impl Variables {
     ///
     /// # Panics
     /// If there is no such item.
+    ///
+    /// # Example
+    /// ```
+    /// use gp_solver::{Options, Problem, QuadraticBuilder, Variables, solve};
+    /// // The height of a point at x = 3 on the circle of radius 5.
+    /// let mut variables = Variables::new();
+    /// let point = variables.add("x and y", 2, 1);
+    /// variables.fix(point, 0);
+    /// let mut circle = QuadraticBuilder::new("circle");
+    /// circle.equation(1.0).product(0, 0, 1.0).product(1, 1, 1.0).constant(-25.0);
+    /// let mut problem = Problem::new(variables);
+    /// problem.add(circle.build());
+    /// let mut x = [3.0, 1.0];
+    /// solve(problem, &mut x, &Options::default())?;
+    /// assert!(x[0] == 3.0 && (x[1] - 4.0).abs() < 1e-9);
+    /// # Ok::<(), gp_solver::SolverError>(())
+    /// ```
     pub fn fix(&mut self, group: Group, item: usize) -> &mut Self {
         assert!(item < group.items, "the group has no item {item}");
         let first = group.column(item, 0);
@@ -225,6 +310,16 @@ impl Variables {
     ///
     /// # Panics
     /// If `size` is not positive and finite.
+    ///
+    /// # Example
+    /// ```
+    /// use gp_solver::Variables;
+    /// let mut variables = Variables::new();
+    /// let angles = variables.add("angles", 2, 1);
+    /// let lengths = variables.add("lengths", 1, 1);
+    /// variables.set_size(lengths, 1e3); // millimetres
+    /// assert_eq!((variables.sizes(), angles.len()), (&[1.0, 1.0, 1e3][..], 2));
+    /// ```
     pub fn set_size(&mut self, group: Group, size: f64) -> &mut Self {
         for item in 0..group.items {
             let first = group.column(item, 0);
@@ -241,6 +336,20 @@ impl Variables {
         assert!(size > 0.0 && size.is_finite(), "a natural size is positive and finite");
         self.scale[range].fill(size);
         self
+    }
+
+    /// Says that the items of a group are points or vectors in space, whose components mean nothing
+    /// each by itself. They are damped by their block of the normal matrix, or alike, by the mean of
+    /// its diagonal, where the scaling is the largest so far; so a turned problem takes turned steps.
+    pub fn set_vectors(&mut self, group: Group) -> &mut Self {
+        self.vectors.push(group);
+        self
+    }
+
+    /// The groups whose items are points or vectors.
+    #[must_use]
+    pub fn vectors(&self) -> &[Group] {
+        &self.vectors
     }
 
     /// The natural size of each unknown.

@@ -24,10 +24,24 @@ pub enum PatchError {
 
 /// Why a mesh is not a net this crate can work on, or a solve cannot be attempted. Not converging is
 /// a status, not an error.
+///
+/// # Example
+/// ```
+/// use geom_core::{DVec3, PolyMesh};
+/// use hyperbolic_nets::{Error, QuadNet};
+/// let mesh = PolyMesh::new(vec![DVec3::ZERO, DVec3::X, DVec3::Y], &[[0, 1, 2]])?;
+/// let error = QuadNet::new(&mesh).unwrap_err();
+/// assert_eq!(error, Error::NotQuad { face: 0, corners: 3 });
+/// assert!(error.to_string().starts_with("face 0 has 3 corners; a net needs quads"));
+/// # Ok::<(), geom_core::MeshError>(())
+/// ```
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 #[expect(missing_docs, reason = "the messages spell out every field")]
 pub enum Error {
+    /// No extent, too much of it, or too far away.
+    #[error(transparent)]
+    Size(#[from] geom_core::NormalizationError),
     /// A face that is not a quad.
     #[error(
         "face {face} has {corners} corners; a net needs quads along the asymptotic directions: remesh the surface to such quads first"

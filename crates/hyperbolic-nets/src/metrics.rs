@@ -1,6 +1,6 @@
 //! All measures of a finished net in one place.
 
-use geom_core::BoundingBox;
+use geom_core::{Ball, BoundingBox};
 use serde::Serialize;
 
 use crate::gates::GateReport;
@@ -14,6 +14,18 @@ use crate::net::{
 const SAME_SHAPE: f64 = 1e-3;
 
 /// Measures of a hyperbolic net against the surface it stands for.
+///
+/// # Example
+/// ```
+/// use geom_core::PolyMesh;
+/// use hyperbolic_nets::{Input, Options, QuadNet, solve};
+/// let model = fixtures::asymptotic_nets::scherk(6);
+/// let net = QuadNet::new(&PolyMesh::new(model.positions, &model.quads)?)?;
+/// let metrics = solve(&Input::new(&net), &Options::default(), &mut ())?.metrics;
+/// assert_eq!((metrics.faces, metrics.vertices, metrics.irregular_vertices), (36, 49, 0));
+/// assert!(metrics.star_planarity_max < 1e-9 && metrics.kink_max_deg < 1e-9 && metrics.folds == 0);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Metrics {
     /// Faces.
@@ -40,10 +52,15 @@ pub struct Metrics {
     /// Different shape parameters, those within 10⁻³ of one another counted as one.
     pub shape_parameters_distinct: usize,
     /// Mean distance of the vertices from the reference (see [`distances`]), in percent of the
-    /// diagonal of the reference's bounding box.
+    /// size of the reference: the diameter of the smallest ball around its vertices.
     pub deviation_mean_percent: f64,
     /// Largest such distance.
     pub deviation_max_percent: f64,
+    /// The mean in percent of the diagonal of the reference's bounding box, as releases before gave
+    /// it.
+    pub deviation_mean_percent_box: f64,
+    /// The largest, likewise.
+    pub deviation_max_percent_box: f64,
     /// Largest such distance, in mean edge lengths.
     pub deviation_max_edges: f64,
     /// How far boundary vertices left the boundary polygon of the input, in mean edge lengths.
@@ -70,8 +87,9 @@ impl Metrics {
         let far = distances(net.positions(), input.reference());
         let mean = far.iter().sum::<f64>() / far.len().max(1) as f64;
         let largest = far.iter().copied().fold(0.0, f64::max);
-        let bounds = BoundingBox::of(input.mesh().positions().iter().copied());
-        let diagonal = bounds.map_or(0.0, |b| b.diagonal());
+        let positions = input.mesh().positions();
+        let size = Ball::around(positions).map_or(0.0, Ball::diameter);
+        let diagonal = BoundingBox::of(positions.iter().copied()).map_or(0.0, |b| b.diagonal());
         let edge_length = net.mesh().mean_edge_length();
         let kinks = surface.kink_statistics();
         let shape = surface.shape();
@@ -90,8 +108,10 @@ impl Metrics {
             shape_parameter_min,
             shape_parameter_max,
             shape_parameters_distinct: distinct_shape_parameters(shape, SAME_SHAPE),
-            deviation_mean_percent: 100.0 * mean / diagonal,
-            deviation_max_percent: 100.0 * largest / diagonal,
+            deviation_mean_percent: 100.0 * mean / size,
+            deviation_max_percent: 100.0 * largest / size,
+            deviation_mean_percent_box: 100.0 * mean / diagonal,
+            deviation_max_percent_box: 100.0 * largest / diagonal,
             deviation_max_edges: largest / edge_length,
             boundary_deviation_max_edges: BoundaryPolygon::deviation(input.net(), net)
                 / edge_length,

@@ -71,6 +71,14 @@ options! {
     ///
     /// Lengths are counted in mean edge lengths and normals in their mean length, so that weights do
     /// not depend on the size of the model. Weights multiply squares.
+    ///
+    /// # Example
+    /// ```
+    /// use hyperbolic_nets::{Boundary, Method, Options};
+    /// let options = Options { boundary: Boundary::Glide, ..Options::default() };
+    /// assert_eq!((options.method, options.fairness), (Method::Joint, None));
+    /// assert!(Options::FIELDS.iter().any(|field| field.name == "boundary"));
+    /// ```
     #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
     #[serde(default, deny_unknown_fields)]
     pub struct Options {

@@ -1,5 +1,6 @@
 //! The whole run: look at the input, solve, measure.
 
+use geom_core::{DVec3, Normalization};
 use gp_solver::{Extra, Fingerprint, Observer, Problem, RunReport, Status};
 
 use crate::error::Error;
@@ -14,13 +15,27 @@ use crate::options::{Boundary, Method, Options};
 use crate::warning::Warning;
 
 /// A hyperbolic net with what is to be said about it.
+///
+/// # Example
+/// ```
+/// use geom_core::PolyMesh;
+/// use hyperbolic_nets::{Input, Options, QuadNet, Status, solve};
+/// let model = fixtures::asymptotic_nets::scherk(6);
+/// let net = QuadNet::new(&PolyMesh::new(model.positions, &model.quads)?)?;
+/// let solution = solve(&Input::new(&net), &Options::default(), &mut ())?;
+/// assert_eq!(solution.report.status, Status::Converged);
+/// assert_eq!(solution.result.shape().len(), 36);
+/// assert!(solution.metrics.kink_max_deg < 1e-9 && solution.metrics.folds == 0);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Clone, Debug)]
 pub struct Solution {
     /// The net with its shape parameters, and its Lelieuvre normals from the joint method.
     pub result: HyperbolicNet,
     /// Its measures.
     pub metrics: Metrics,
-    /// What the solver did. The joint method has converged if no exact equation is violated by more
+    /// What the solver did. A net that folds is [`Status::Partial`] or [`Status::Failed`], by
+    /// [`Status::checked`] on its inner edges. Else the joint method has converged if no exact equation is violated by more
     /// than [`Options::polish_tol`] and has stalled otherwise; the published one has converged if
     /// its last round hardly changed the largest kink.
     pub report: RunReport,
@@ -69,7 +84,7 @@ pub fn solve(
 /// The joint method calls it twice. First for its weighted stages, which share one problem (the
 /// [`Stage`](gp_solver::Stage) is the first of them): there blocks are terms of the energy beside
 /// the others, and a weight of one's own says how much they count; unknowns have the coordinates of
-/// the model. Then for the stage [`crate::POLISH`], in which every row of every block is an
+/// the [`Stage`](gp_solver::Stage), which says where a point of the model stands there. Then for the stage [`crate::POLISH`], in which every row of every block is an
 /// **equation**: the net is moved by as little as possible onto the Lelieuvre equations and these
 /// rows together, to [`Options::polish_tol`] each, counted in mean edge lengths of movement whatever
 /// unit and weight a row has. So a closure that adds the same block both times gets rows that hold
@@ -109,6 +124,7 @@ pub fn solve_with(
     observer: &mut dyn Observer,
 ) -> Result<Solution, Error> {
     options.check()?;
+    let place = input.place()?;
     let field = AsymptoticField::new(input.mesh());
     let gates = inspect(input.net(), &field);
     let mut warnings = gates.check()?;
@@ -118,6 +134,8 @@ pub fn solve_with(
         Method::Published => Published::new(input, options).solve(extra, &mut watch)?,
     };
     let metrics = Metrics::new(&result, input, &field, &gates);
+    let edges = input.net().inner_edges().len();
+    let report = RunReport { status: report.status.checked(metrics.folds, edges), ..report };
     if metrics.folds > 0 {
         warnings.push(Warning::ResultFolds { edges: metrics.folds });
     }
@@ -128,15 +146,43 @@ pub fn solve_with(
     if report.status == Status::Stalled {
         warnings.push(Warning::NotExact);
     }
+    let result = restored(&result, input, &place)?;
     Ok(Solution { result, metrics, report, gates, warnings, violation })
+}
+
+/// A net in normalised coordinates back where the model stands; Lelieuvre normals are roots of
+/// lengths.
+fn restored(
+    net: &HyperbolicNet,
+    input: &Input<'_>,
+    place: &Normalization,
+) -> Result<HyperbolicNet, Error> {
+    let pairs = net.net().positions().iter().zip(input.given().positions());
+    let positions: Vec<DVec3> = pairs.map(|(&p, &given)| place.restore_given(p, given)).collect();
+    let root = place.scale().sqrt();
+    let normals = net.normals().map(|normals| normals.iter().map(|&n| n / root).collect());
+    HyperbolicNet::new(net.net().clone().with_positions(&positions), normals, net.shape().to_vec())
 }
 
 /// The problem of the first stage, weighed for it.
 ///
 /// # Errors
 /// As [`solve`]; the input is not inspected.
+///
+/// # Example
+/// ```
+/// use geom_core::PolyMesh;
+/// use hyperbolic_nets::{Input, Options, POSITIONS, QuadNet, problem};
+/// let model = fixtures::asymptotic_nets::scherk(6);
+/// let net = QuadNet::new(&PolyMesh::new(model.positions, &model.quads)?)?;
+/// let (input, options) = (Input::new(&net), Options::default());
+/// let problem = problem(&input, &options)?;
+/// assert_eq!(problem.variables().group(POSITIONS)?.len(), 49);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 pub fn problem<'i>(input: &'i Input<'i>, options: &'i Options) -> Result<Problem<'i>, Error> {
     options.check()?;
+    input.place()?;
     let field = AsymptoticField::new(input.mesh());
     match options.method {
         Method::Joint => Joint::new(input, options, &field)?.problem(),
@@ -147,7 +193,7 @@ pub fn problem<'i>(input: &'i Input<'i>, options: &'i Options) -> Result<Problem
 /// Of everything a run depends on but a reference surface that is no mesh.
 fn fingerprint(input: &Input<'_>, options: &Options) -> u64 {
     let mut of = Fingerprint::new();
-    for point in input.net().positions().iter().chain(input.mesh().positions()) {
+    for point in input.given().positions().iter().chain(input.mesh().positions()) {
         of = of.numbers(&point.to_array());
     }
     let corners = input.net().quads().iter().flatten();

@@ -41,10 +41,12 @@ pub(crate) fn unknowns(net: &QuadNet, options: &Options) -> (Variables, Group, O
     if alone {
         let positions = variables.add(POSITIONS, vertices, 3);
         variables.set_runs(3);
+        variables.set_vectors(positions);
         return (variables, positions, None);
     }
     let [positions, normals] = variables.interleave(vertices, [(POSITIONS, 3), (NORMALS, 3)]);
     variables.set_runs(6);
+    variables.set_vectors(positions).set_vectors(normals);
     (variables, positions, Some(normals))
 }
 

@@ -48,8 +48,9 @@ fn a_wish_is_left_out_of_the_polishing_and_the_net_is_exact() {
             let positions = variables.group(POSITIONS)?;
             let (mut target, mut weights) =
                 (vec![0.0; variables.len()], vec![0.0; variables.len()]);
-            positions.set(&mut target, middle, lifted.to_array());
-            positions.set(&mut weights, middle, [10.0 / net.mesh().mean_edge_length(); 3]);
+            positions.set(&mut target, middle, stage.place(lifted.to_array()));
+            let edge = stage.length(net.mesh().mean_edge_length());
+            positions.set(&mut weights, middle, [10.0 / edge; 3]);
             problem.add(Closeness::new("lift", target, weights));
         }
         Ok(())

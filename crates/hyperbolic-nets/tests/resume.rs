@@ -76,6 +76,7 @@ fn check(options: &Options) {
 fn the_joint_method_resumes_with_the_same_bytes() {
     check(&Options::default());
     check(&Options { boundary: Boundary::Fixed, steps_per_stage: 6, ..Options::default() });
+    check(&Options { boundary: Boundary::Glide, ..Options::default() });
 }
 
 #[test]

@@ -1,10 +1,26 @@
 //! Why a paneling was refused.
 
 /// Why a paneling was refused.
+///
+/// # Example
+/// ```
+/// use paneling::{Counts, Error, Options, solve};
+/// let surface = fixtures::surfaces::Shape::Saddle.surface(8, 8, 4, 4);
+/// let options = Options {
+///     panels: Some(Counts { u: 3, v: 3 }),
+///     molds: Some(10),
+///     ..Options::default()
+/// };
+/// let error = solve(&surface, &options, &mut ()).unwrap_err();
+/// assert_eq!(error, Error::MoldCount { molds: 10, panels: 9 });
+/// ```
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 #[expect(missing_docs, reason = "the messages spell out every field")]
 pub enum Error {
+    /// No extent, too much of it, or too far away.
+    #[error(transparent)]
+    Size(#[from] geom_core::NormalizationError),
     /// A layout with no panels in one direction.
     #[error("a layout of {u} x {v} panels has none; ask for at least 1 x 1")]
     NoPanels { u: usize, v: usize },

@@ -6,6 +6,7 @@ use crate::layout::tiling::Layout;
 use crate::mold::prices::PriceList;
 use crate::options::{Options, PANELS};
 use bspline::BsplineSurface;
+use geom_core::DVec3;
 use gp_solver::Counts;
 
 /// What is to be panelled: a surface, or panels that are cut already; and what molds and panels
@@ -68,10 +69,23 @@ impl<'a> Input<'a> {
     /// The panels, cut as the options say.
     ///
     /// # Errors
-    /// [`Error`] of the layout, [`Error::Singular`] where the surface has no normal.
+    /// [`Error`] of the layout, [`Error::Singular`] where the surface has no normal, [`Error::Size`]
+    /// for one without extent.
     pub fn panels(&self, options: &Options) -> Result<PanelSet, Error> {
+        let (centred, center) = self.centred(options)?;
+        Ok(centred.placed(center))
+    }
+
+    /// The panels moved to the origin, and by what they have been moved away from.
+    pub(crate) fn centred(&self, options: &Options) -> Result<(PanelSet, DVec3), Error> {
         let (surface, layout) = match self.cut {
-            Cut::Panels(panels) => return Ok(panels.clone()),
+            Cut::Panels(panels) => {
+                // Panels are made by `PanelSet::new` only, which keeps them at the origin too.
+                return Ok(match &panels.at_origin {
+                    Some((centred, center)) => (PanelSet::clone(centred), *center),
+                    None => (panels.clone(), DVec3::ZERO),
+                });
+            }
             Cut::Surface(surface, layout) => (surface, layout),
         };
         let layout = match layout {
@@ -85,6 +99,6 @@ impl<'a> Input<'a> {
         };
         let layout =
             if options.equal_arc_length { layout.with_equal_arc_length(surface) } else { layout };
-        PanelSet::new(surface, &layout)
+        PanelSet::centred(surface, &layout)
     }
 }

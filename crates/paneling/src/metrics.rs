@@ -5,7 +5,8 @@ use crate::paneling::Paneling;
 use serde::Serialize;
 
 /// How well the panels of one paneling meet, in degrees, units of the model, and percent of the
-/// diagonal of the bounding box of all panels.
+/// size of the design (the diameter of the smallest ball around its check grid); `_box` of the
+/// diagonal of the bounding box of all panels, as releases before gave it.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Quality {
     /// Number of panels.
@@ -38,6 +39,14 @@ pub struct Quality {
     pub deviation_max_percent: f64,
     /// Root mean square of the distances of all samples of the panels from the design, in percent.
     pub deviation_rms_percent: f64,
+    /// [`gap_median`](Self::gap_median) in percent of the box.
+    pub gap_median_percent_box: f64,
+    /// [`gap_p95`](Self::gap_p95) in percent of the box.
+    pub gap_p95_percent_box: f64,
+    /// [`gap_max`](Self::gap_max) in percent of the box.
+    pub gap_max_percent_box: f64,
+    /// [`deviation_max_percent`](Self::deviation_max_percent) of the box.
+    pub deviation_max_percent_box: f64,
 }
 
 impl Quality {
@@ -45,7 +54,9 @@ impl Quality {
     #[must_use]
     pub fn new(set: &PanelSet, paneling: &Paneling) -> Self {
         let (kinks, gaps) = (paneling.measures.kinks, paneling.measures.gaps);
-        let percent = |length: f64| set.percent_of_diagonal(length);
+        let percent = |length: f64| 100.0 * length / set.extent();
+        let of_box = |length: f64| 100.0 * length / set.diagonal();
+        let deviation = paneling.measures.max_deviation();
         Self {
             panels: set.len(),
             molds: paneling.molds.len(),
@@ -60,13 +71,29 @@ impl Quality {
             gap_median_percent: percent(gaps.median),
             gap_p95_percent: percent(gaps.p95),
             gap_max_percent: percent(gaps.max),
-            deviation_max_percent: percent(paneling.measures.max_deviation()),
+            deviation_max_percent: percent(deviation),
             deviation_rms_percent: percent(paneling.measures.deviation_rms),
+            gap_median_percent_box: of_box(gaps.median),
+            gap_p95_percent_box: of_box(gaps.p95),
+            gap_max_percent_box: of_box(gaps.max),
+            deviation_max_percent_box: of_box(deviation),
         }
     }
 }
 
 /// The numbers of a solution.
+///
+/// # Example
+/// ```
+/// use paneling::{Counts, Options, solve};
+/// let surface = fixtures::surfaces::Shape::Saddle.surface(8, 8, 4, 4);
+/// let panels = Some(Counts { u: 4, v: 3 });
+/// let options = Options { panels, molds: Some(3), ..Options::default() };
+/// let metrics = solve(&surface, &options, &mut ())?.metrics;
+/// // Without prices every mold costs 1 and panels nothing.
+/// assert_eq!((metrics.quality.molds, metrics.cost, metrics.worst_excess), (3, 3.0, None));
+/// # Ok::<(), paneling::Error>(())
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Metrics {
     /// How well the panels meet.

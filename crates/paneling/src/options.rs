@@ -68,6 +68,19 @@ options! {
     ///
     /// The number of molds follows from one of three rules: `k`, `molds`, or the bounds
     /// `max_kink_deg` and `max_gap`, for which the cheapest molds are searched.
+    ///
+    /// # Example
+    /// ```
+    /// use paneling::{Counts, MoldType, Options, Pattern};
+    /// let options = Options {
+    ///     panels: Some(Counts { u: 20, v: 12 }),
+    ///     layout: Pattern::Staggered,
+    ///     mold_types: vec![MoldType::Plane, MoldType::Cylinder].into(),
+    ///     max_kink_deg: Some(1.0),
+    ///     ..Options::default()
+    /// };
+    /// assert_eq!((options.k, options.seam_steps), (None, 40));
+    /// ```
     #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
     #[serde(default, deny_unknown_fields)]
     pub struct Options {

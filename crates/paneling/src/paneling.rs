@@ -5,8 +5,21 @@ use crate::mold::prices::PriceList;
 use crate::mold::shape::Mold;
 use crate::seam::measure::{Measures, measure};
 use crate::search::attempt::Found;
+use geom_core::DVec3;
 
 /// Panels on their molds; lengths in model units.
+///
+/// # Example
+/// ```
+/// use paneling::{Counts, MoldType, Options, Price, PriceList, solve};
+/// let surface = fixtures::surfaces::Shape::Saddle.surface(8, 8, 4, 4);
+/// let panels = Some(Counts { u: 4, v: 3 });
+/// let options = Options { panels, molds: Some(3), ..Options::default() };
+/// let paneling = solve(&surface, &options, &mut ())?.result;
+/// let prices = PriceList::new([(MoldType::Cubic, Price { mold: 900.0, panel: 45.0 })]);
+/// assert_eq!(paneling.cost(&prices), 3.0 * 900.0 + 12.0 * 45.0);
+/// # Ok::<(), paneling::Error>(())
+/// ```
 #[derive(Clone, Debug, PartialEq)]
 pub struct Paneling {
     /// The molds.
@@ -36,6 +49,12 @@ impl Paneling {
             .collect();
         let measures = measure(set, &molds, &fit.labels, &poses);
         Self { molds, labels: fit.labels, poses, measures, fit_history, seam_history }
+    }
+
+    /// The same panels somewhere else.
+    pub(crate) fn translated(mut self, by: DVec3) -> Self {
+        self.poses.iter_mut().for_each(|pose| pose.origin += by);
+        self
     }
 
     /// Total cost of molds and panels.

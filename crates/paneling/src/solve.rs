@@ -18,6 +18,19 @@ use gp_solver::{
 };
 
 /// Panels on molds with what is to be said about them.
+///
+/// # Example
+/// ```
+/// use paneling::{Counts, Options, solve};
+/// let surface = fixtures::surfaces::Shape::Saddle.surface(8, 8, 4, 4);
+/// let panels = Some(Counts { u: 4, v: 3 });
+/// let options = Options { panels, molds: Some(3), ..Options::default() };
+/// let solution = solve(&surface, &options, &mut ())?;
+/// assert_eq!((solution.panels.len(), solution.result.molds.len()), (12, 3));
+/// // Panel 5 lies on this mold.
+/// assert!(solution.result.labels[5] < 3);
+/// # Ok::<(), paneling::Error>(())
+/// ```
 #[derive(Clone, Debug)]
 pub struct Solution {
     /// The panels on their molds, in units of the model.
@@ -110,12 +123,25 @@ pub fn solve_with<'a>(
 ///
 /// # Errors
 /// As [`solve`].
+///
+/// # Example
+/// ```
+/// use paneling::{Counts, Options, problem};
+/// let surface = fixtures::surfaces::Shape::Saddle.surface(8, 8, 4, 4);
+/// let panels = Some(Counts { u: 4, v: 3 });
+/// let options = Options { panels, molds: Some(3), ..Options::default() };
+/// let (problem, start) = problem(&surface, &options)?;
+/// assert_eq!(problem.unknowns(), start.len());
+/// // Six numbers place a panel.
+/// assert_eq!(problem.variables().group(paneling::blocks::POSES).map(|g| g.width()), Ok(6));
+/// # Ok::<(), paneling::Error>(())
+/// ```
 pub fn problem<'a>(
     input: impl Into<Input<'a>>,
     options: &Options,
 ) -> Result<(Problem<'static>, Vec<f64>), Error> {
     let input = input.into();
-    let panels = input.panels(options)?;
+    let (panels, _) = input.centred(options)?;
     let site = Site::new(&panels, &input.prices, options)?;
     let mut nobody = ();
     let pulse = Pulse::new(&mut nobody);
@@ -136,7 +162,7 @@ fn run(
     observer: &mut dyn Observer,
 ) -> Result<Solution, Error> {
     options.check()?;
-    let panels = input.panels(options)?;
+    let (panels, center) = input.centred(options)?;
     let site = Site::new(&panels, &input.prices, options)?;
     let pulse = Pulse::new(observer);
     let (fits, found, grid, is_done) = match Course::new(&site, &pulse)? {
@@ -165,6 +191,9 @@ fn run(
         worst_excess,
         grid: of_grid.map(|grid| Quality::new(&panels, grid)),
     };
+    // Measured where rounding is small, then moved to where the design stands.
+    let back = |paneling: Paneling| paneling.translated(center);
+    let (result, grid, panels) = (back(result), grid.map(back), panels.placed(center));
     Ok(Solution { result, panels, metrics, grid, report, fits })
 }
 

@@ -167,7 +167,7 @@ proptest! {
         let q = solution.metrics.quality;
         prop_assert!(q.kink_median_deg <= q.kink_p95_deg && q.kink_p95_deg <= q.kink_max_deg);
         prop_assert!(q.gap_median <= q.gap_p95 && q.gap_p95 <= q.gap_max);
-        let percent = 100.0 * q.gap_max / solution.panels.diagonal();
+        let percent = 100.0 * q.gap_max / solution.panels.extent();
         prop_assert!(is_near(q.gap_max_percent, percent, 1e-14));
     }
 

@@ -5,7 +5,7 @@
 use fixtures::surfaces::Shape;
 use gp_solver::{Checkpoint, Closeness, Observer, Problem, Progress, Stage, Status, Variables};
 use paneling::blocks::MOLDS;
-use paneling::{Counts, Error, List, MoldType, Options, Solution, solve, solve_with};
+use paneling::{Clustering, Counts, Error, List, MoldType, Options, Solution, solve, solve_with};
 use std::ops::ControlFlow;
 use std::time::{Duration, Instant};
 
@@ -97,6 +97,15 @@ fn a_resumed_run_ends_with_the_same_bytes() {
 fn a_resumed_search_ends_with_the_same_bytes() {
     let surface = Shape::Roof.surface(10, 10, 4, 4);
     resumes_with_the_same_bytes(&|watch| solve(&surface, &search(), watch));
+}
+
+#[test]
+fn a_resumed_run_of_every_clustering_ends_with_the_same_bytes() {
+    let surface = Shape::Roof.surface(10, 10, 4, 4);
+    for clustering in [Clustering::Cover, Clustering::Grid] {
+        let options = Options { clustering, mold_types: List(vec![MoldType::Torus]), ..by_rule() };
+        resumes_with_the_same_bytes(&|watch| solve(&surface, &options, watch));
+    }
 }
 
 #[test]

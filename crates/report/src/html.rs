@@ -111,7 +111,9 @@ impl Report {
     fn head(&self) -> String {
         let mut head = format!("<header>\n<h1>{}</h1>\n", escape(&self.title));
         if !self.status.is_empty() {
-            let class = if self.status == "converged" { "status" } else { "status attention" };
+            // Steps that were asked for and made are no cause for alarm.
+            let is_fine = matches!(self.status.as_str(), "converged" | "iteration_limit");
+            let class = if is_fine { "status" } else { "status attention" };
             let status = escape(&self.status.replace('_', " "));
             let _ = writeln!(head, "<span class=\"{class}\">{status}</span>");
         }

@@ -23,6 +23,13 @@ pub enum Blend {
 
 /// Value and three derivatives of the C³ step `1 − (35 s⁴ − 84 s⁵ + 70 s⁶ − 20 s⁷)`, from 1 at
 /// `s = 0` to 0 at `s = 1`.
+///
+/// # Example
+/// ```
+/// use subdiv_catmull_clark::septic_step;
+/// assert_eq!(septic_step(0.0), [1.0, 0.0, 0.0, 0.0]);
+/// assert_eq!((septic_step(0.5)[0], septic_step(1.0)), (0.5, [0.0; 4]));
+/// ```
 #[must_use]
 pub fn septic_step(s: f64) -> [f64; 4] {
     if s >= 1.0 {

@@ -28,6 +28,15 @@ pub struct LimitMasks {
 ///
 /// # Panics
 /// If `n < 3`.
+///
+/// # Example
+/// ```
+/// let regular = subdiv_catmull_clark::limit_masks(4);
+/// // The weights of cubic B-splines, (1, 4, 1) / 6, times themselves.
+/// assert!((regular.position[0] - 16.0 / 36.0).abs() < 1e-15);
+/// assert!((regular.position[1] - 4.0 / 36.0).abs() < 1e-15);
+/// assert!((regular.position[2] - 1.0 / 36.0).abs() < 1e-15);
+/// ```
 #[must_use]
 pub fn limit_masks(n: usize) -> LimitMasks {
     assert!(n >= 3, "an interior vertex has at least three edges");

@@ -12,6 +12,28 @@ pub const INFINITE_SHARPNESS: f64 = f64::INFINITY;
 /// afterwards; boundary edges are always infinitely sharp and need no entry. A corner vertex is
 /// interpolated. A boundary vertex with a single face is a corner by itself, so that the surface
 /// of a regular grid with boundary is the bi-cubic B-spline with natural ends.
+///
+/// # Example
+/// ```
+/// use geom_core::{DVec3, PolyMesh};
+/// use subdiv_catmull_clark::{Creases, INFINITE_SHARPNESS, refine};
+/// # let corners = (0..8).map(|k| {
+/// #     DVec3::new(f64::from(k & 1), f64::from(k >> 1 & 1), f64::from(k >> 2)) * 2.0 - 1.0
+/// # });
+/// # let ends = [[0, 2, 3, 1], [4, 5, 7, 6]];
+/// # let sides = [[0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]];
+/// # let faces = [&ends[..], &sides].concat();
+/// # let cube = PolyMesh::new(corners.collect(), &faces)?;
+/// // A cube from −1 to 1 of which all edges are sharp stays a cube.
+/// let mut creases = Creases::none();
+/// for edge in cube.edges() {
+///     creases.set(cube.origin(edge), cube.target(edge), INFINITE_SHARPNESS);
+/// }
+/// let once = refine(&cube, &creases)?;
+/// let twice = refine(&once.mesh, &once.creases)?;
+/// assert!(twice.mesh.positions().iter().all(|p| p.abs().max_element() == 1.0));
+/// # Ok::<(), geom_core::MeshError>(())
+/// ```
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Creases {
     sharpness: HashMap<(u32, u32), f64>,
@@ -92,6 +114,22 @@ impl CreaseList {
     ///
     /// # Errors
     /// [`CreaseError`] names the first entry at fault.
+    ///
+    /// # Example
+    /// ```
+    /// use geom_core::{DVec3, PolyMesh, VertexId};
+    /// use subdiv_catmull_clark::CreaseList;
+    /// let corners = vec![DVec3::ZERO, DVec3::X, DVec3::X + DVec3::Y, DVec3::Y];
+    /// let quad = PolyMesh::new(corners, &[[0, 1, 2, 3]])?;
+    /// let side = CreaseList { edges: vec![((0, 1), 2.5)], corners: vec![3] }.for_mesh(&quad)?;
+    /// assert_eq!(side.sharpness(VertexId(1), VertexId(0)), 2.5);
+    /// let diagonal = CreaseList { edges: vec![((0, 2), 2.5)], corners: vec![] };
+    /// assert_eq!(
+    ///     diagonal.for_mesh(&quad).unwrap_err().to_string(),
+    ///     "the mesh has no edge 0–2 to crease; name the two ends of an edge"
+    /// );
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
     pub fn for_mesh(&self, mesh: &PolyMesh) -> Result<Creases, CreaseError> {
         let count = mesh.vertex_count();
         let known = |vertex: u32| {

@@ -23,6 +23,16 @@ const BINOMIAL: [[f64; 4]; 4] =
     [[1.0, 0.0, 0.0, 0.0], [1.0, 1.0, 0.0, 0.0], [1.0, 2.0, 1.0, 0.0], [1.0, 3.0, 3.0, 1.0]];
 
 /// The jet of a product, by Leibniz' rule.
+///
+/// # Example
+/// ```
+/// use subdiv_catmull_clark::{JET_ORDERS, jet_product};
+/// // u times v at (2, 3).
+/// let u = [2.0, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0];
+/// let v = [3.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0];
+/// assert_eq!(jet_product(&u, &v), [6.0, 3.0, 2.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0]);
+/// assert_eq!(JET_ORDERS[4], (1, 1));
+/// ```
 #[must_use]
 pub fn jet_product(a: &Jet, b: &Jet) -> Jet {
     let mut out = [0.0; JET_LEN];
@@ -46,6 +56,13 @@ pub(crate) fn separable_jet(f: &[f64; 4], g: &[f64; 4]) -> Jet {
 
 /// The four uniform cubic B-spline basis functions on one span: `basis[d][k]` is the derivative
 /// of order `d` of the function of control point `k` at `t` in `[0, 1]`.
+///
+/// # Example
+/// ```
+/// let [value, slope, bend, _] = subdiv_catmull_clark::cubic_basis(0.0);
+/// assert_eq!(value, [1.0 / 6.0, 4.0 / 6.0, 1.0 / 6.0, 0.0]);
+/// assert_eq!((slope, bend), ([-0.5, 0.0, 0.5, 0.0], [1.0, -2.0, 1.0, 0.0]));
+/// ```
 #[must_use]
 pub fn cubic_basis(t: f64) -> [[f64; 4]; 4] {
     let s = 1.0 - t;

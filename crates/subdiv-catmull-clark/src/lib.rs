@@ -24,10 +24,12 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
+mod bezier;
 mod blend;
 mod characteristic;
 mod classes;
 mod crease;
+mod error;
 mod guide;
 mod jet;
 mod limit;
@@ -40,9 +42,8 @@ mod wide;
 pub use blend::{Blend, flat_step, septic_step};
 pub use characteristic::{LimitMasks, limit_masks, subdominant_eigenvalue};
 pub use crease::{CreaseError, CreaseList, Creases, INFINITE_SHARPNESS};
+pub use error::SubdivisionError;
 pub use jet::{JET_LEN, JET_ORDERS, Jet, JetWeights, cubic_basis, jet_product};
 pub use limit::{LimitFrame, limit_frames};
 pub use refine::{Refined, Stencils, refine};
-pub use surface::{
-    BasisId, GuideSector, Patch, SubdivisionError, SubdivisionSurface, refinements_needed,
-};
+pub use surface::{BasisId, GuideSector, Patch, SubdivisionSurface, refinements_needed};

@@ -39,6 +39,28 @@ fn combine(weights: &[(u32, f64)], positions: &[DVec3]) -> DVec3 {
 /// Interior vertices off the creases use the closed-form masks of Halstead, Kass and DeRose 1993,
 /// which the blend at extraordinary vertices keeps to leading order only: a blended vertex uses
 /// the blended patch. All others take the jet of a patch at its corner.
+///
+/// # Example
+/// ```
+/// use geom_core::{DVec3, PolyMesh};
+/// use subdiv_catmull_clark::{Blend, Creases, SubdivisionSurface, limit_frames};
+/// # let xy = |k: u32| (f64::from(k / 5), f64::from(k % 5));
+/// # let points = (0..25).map(xy).map(|(x, y)| DVec3::new(x, y, x * x)).collect();
+/// # let quad = |k: u32| {
+/// #     let at = 5 * (k / 4) + k % 4;
+/// #     [at, at + 5, at + 6, at + 1]
+/// # };
+/// # let mesh = PolyMesh::new(points, &(0..16).map(quad).collect::<Vec<_>>())?;
+/// // On a grid of five by five vertices with z = x², whose limit inside is x² + 1/3.
+/// let surface = SubdivisionSurface::new(&mesh, &Creases::none(), Blend::Smooth)?;
+/// let frames = limit_frames(&mesh, &surface);
+/// let middle = frames[12].as_ref().expect("it has faces");
+/// let point = middle.point(mesh.positions());
+/// assert!(point.distance(DVec3::new(2.0, 2.0, 4.0 + 1.0 / 3.0)) < 1e-14);
+/// let normal = DVec3::new(-4.0, 0.0, 1.0).normalize();
+/// assert!(middle.normal(mesh.positions()).distance(normal) < 1e-14);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[must_use]
 pub fn limit_frames(mesh: &PolyMesh, surface: &SubdivisionSurface) -> Vec<Option<LimitFrame>> {
     mesh.vertices().map(|v| frame(mesh, surface, v)).collect()

@@ -4,6 +4,21 @@ use crate::crease::{Creases, INFINITE_SHARPNESS, Tags, VertexMask};
 use geom_core::{DVec3, HalfEdgeId, MeshError, PolyMesh, VertexId};
 
 /// A sparse matrix that makes new points from old ones; every row sums to one.
+///
+/// # Example
+/// ```
+/// use geom_core::{DVec3, PolyMesh};
+/// use subdiv_catmull_clark::{Creases, refine};
+/// let corners = vec![DVec3::ZERO, DVec3::X, DVec3::X + DVec3::Y, DVec3::Y];
+/// let quad = PolyMesh::new(corners, &[[0, 1, 2, 3]])?;
+/// let stencils = refine(&quad, &Creases::none())?.stencils;
+/// // The last new point is the middle of the face.
+/// assert_eq!(stencils.row(8), (&[0, 1, 2, 3][..], &[0.25; 4][..]));
+/// // Refined again with other positions, at the cost of a product.
+/// let raised: Vec<DVec3> = quad.positions().iter().map(|p| *p + DVec3::Z).collect();
+/// assert_eq!(stencils.apply(&raised)[8], DVec3::new(0.5, 0.5, 1.0));
+/// # Ok::<(), geom_core::MeshError>(())
+/// ```
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Stencils {
     starts: Vec<usize>,
@@ -82,6 +97,19 @@ pub struct Refined {
 ///
 /// # Errors
 /// [`MeshError::TooLarge`] if the result has more half-edges than ids.
+///
+/// # Example
+/// ```
+/// use geom_core::{DVec3, PolyMesh};
+/// use subdiv_catmull_clark::{Creases, refine};
+/// let corners = vec![DVec3::ZERO, DVec3::X, DVec3::Y, DVec3::Z];
+/// let tetrahedron = PolyMesh::new(corners, &[[0, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3]])?;
+/// let fine = refine(&tetrahedron, &Creases::none())?.mesh;
+/// // One vertex for each vertex, edge and face; one quad for each corner of a face.
+/// assert_eq!((fine.vertex_count(), fine.face_count()), (4 + 6 + 4, 12));
+/// assert_eq!(fine.euler_characteristic(), 2);
+/// # Ok::<(), geom_core::MeshError>(())
+/// ```
 pub fn refine(mesh: &PolyMesh, creases: &Creases) -> Result<Refined, MeshError> {
     let tags = Tags::new(mesh, creases);
     let (faces, stencils) = refine_tagged(mesh, &tags);

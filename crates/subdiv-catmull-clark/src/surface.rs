@@ -4,6 +4,7 @@ use crate::blend::{Blend, flat_step, weight_jet};
 use crate::characteristic::{characteristic_map, limit_masks};
 use crate::classes::Classes;
 use crate::crease::{Creases, Tags};
+use crate::error::SubdivisionError;
 use crate::guide::{Guide, MONOMIALS, coordinate_jets};
 use crate::jet::{JET_LEN, Jet, JetWeights, jet_product};
 use crate::local::LocalPatch;
@@ -13,27 +14,6 @@ use geom_core::{DVec3, FaceId, HalfEdgeId, PolyMesh, SurfaceJet, VertexId};
 use std::collections::HashMap;
 use std::collections::hash_map::Entry;
 use std::sync::Arc;
-
-/// Why a control mesh cannot be evaluated.
-#[derive(Clone, Debug, PartialEq, thiserror::Error)]
-#[non_exhaustive]
-#[expect(missing_docs, reason = "the messages spell out every field")]
-pub enum SubdivisionError {
-    /// A face that is not a quad.
-    #[error("face {face} has {corners} corners; refine the mesh once to turn all faces into quads")]
-    NotQuad { face: usize, corners: usize },
-    /// An extraordinary vertex whose ring is not regular.
-    #[error(
-        "extraordinary vertex {vertex} has vertex {neighbour}, which is not regular, in its ring; refine the mesh once more"
-    )]
-    Crowded { vertex: usize, neighbour: usize },
-    /// A vertex with two edges inside the surface.
-    #[error("interior vertex {vertex} has only 2 edges; merge its two faces")]
-    ValenceTwo { vertex: usize },
-    /// The mesh around a face overlaps itself.
-    #[error("the faces around face {face} overlap one another; refine the mesh once more")]
-    Overlapping { face: usize },
-}
 
 /// Patches with the same [`BasisId`] have the same weights on their control points.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
@@ -102,6 +82,25 @@ impl GuideSector {
 /// Everything is linear in the control points: a patch's jets are its basis' weights times its
 /// control points, and patches of one connectivity share their basis, which depends on the
 /// valence alone. The surface holds connectivity only; positions are passed to each evaluation.
+///
+/// # Example
+/// ```
+/// use geom_core::{DVec3, PolyMesh};
+/// use subdiv_catmull_clark::{Blend, Creases, SubdivisionSurface};
+/// // Control points on z = x²: inside, the cubic B-spline of such values is x² + 1/3.
+/// let xy = |k: u32| (f64::from(k / 5), f64::from(k % 5));
+/// let points = (0..25).map(xy).map(|(x, y)| DVec3::new(x, y, x * x)).collect();
+/// let quad = |k: u32| {
+///     let at = 5 * (k / 4) + k % 4;
+///     [at, at + 5, at + 6, at + 1]
+/// };
+/// let mesh = PolyMesh::new(points, &(0..16).map(quad).collect::<Vec<_>>())?;
+/// let surface = SubdivisionSurface::new(&mesh, &Creases::none(), Blend::Smooth)?;
+/// let jet = surface.evaluate(mesh.positions(), &surface.patches()[5], 0.5, 0.5);
+/// assert!(jet.position().distance(DVec3::new(1.5, 1.5, 2.25 + 1.0 / 3.0)) < 1e-14);
+/// assert!((jet.d(1, 0).z - 3.0).abs() < 1e-14 && (jet.d(2, 0).z - 2.0).abs() < 1e-14);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Clone, Debug)]
 pub struct SubdivisionSurface {
     classes: Classes,
@@ -320,38 +319,22 @@ impl SubdivisionSurface {
             }
         })
     }
-
-    /// Control points of a patch as a bi-cubic Bezier patch, `points[i][j]` for the `i`-th column
-    /// in `u`; `None` if the patch is not a B-spline patch.
-    #[must_use]
-    pub fn bezier(&self, positions: &[DVec3], patch: &Patch) -> Option<[[DVec3; 4]; 4]> {
-        // Rows: Bezier points from uniform B-spline points, times six.
-        const CHANGE: [[f64; 4]; 4] = [
-            [1.0, 4.0, 1.0, 0.0],
-            [0.0, 4.0, 2.0, 0.0],
-            [0.0, 2.0, 4.0, 0.0],
-            [0.0, 1.0, 4.0, 1.0],
-        ];
-        let grid = self.b_spline_grid(patch.basis)?;
-        let at = |i: usize, j: usize| -> DVec3 {
-            grid[4 * i + j].iter().map(|&(k, w)| w * positions[patch.controls[k] as usize]).sum()
-        };
-        let mut out = [[DVec3::ZERO; 4]; 4];
-        for (i, row) in out.iter_mut().enumerate() {
-            for (j, point) in row.iter_mut().enumerate() {
-                for p in 0..4 {
-                    for q in 0..4 {
-                        *point += CHANGE[i][p] * CHANGE[j][q] / 36.0 * at(p, q);
-                    }
-                }
-            }
-        }
-        Some(out)
-    }
 }
 
 /// Number of refinements after which all faces are quads and every blended vertex has a regular
 /// ring: 0 if `mesh` can be used as it is.
+///
+/// # Example
+/// ```
+/// use geom_core::{DVec3, PolyMesh};
+/// use subdiv_catmull_clark::{Creases, refine, refinements_needed};
+/// let corners = vec![DVec3::ZERO, DVec3::X, DVec3::Y, DVec3::Z];
+/// let tetrahedron = PolyMesh::new(corners, &[[0, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3]])?;
+/// assert_eq!(refinements_needed(&tetrahedron, &Creases::none()), 2);
+/// let once = refine(&tetrahedron, &Creases::none())?;
+/// assert_eq!(refinements_needed(&once.mesh, &once.creases), 1);
+/// # Ok::<(), geom_core::MeshError>(())
+/// ```
 #[must_use]
 pub fn refinements_needed(mesh: &PolyMesh, creases: &Creases) -> usize {
     let quads = mesh.is_quad_mesh();

@@ -1,8 +1,9 @@
 //! A saddle becomes a Weingarten surface over four levels while its front border stays in the plane
 //! of a facade (a block with a hand-written Jacobian) and its middle stays within a tube (a block on
-//! dual numbers). Writes the surface, and says what would have happened without the two.
+//! dual numbers). Writes the surface, says what would have happened without the two, and draws both
+//! into a folder if one is named.
 //!
-//! `cargo run --release -p weingarten --example own_constraints -- saddle.glb`
+//! `cargo run --release -p weingarten --example own_constraints -- saddle.glb pictures`
 #![allow(clippy::print_stdout, reason = "an example tells what it found")]
 
 use bspline::{BsplineSurface, Degree, KnotVector};
@@ -11,6 +12,7 @@ use gp_solver::{
     Variables,
 };
 use numerics::Number;
+use report::{Report, ScalarField, SurfaceView};
 use weingarten::{CONTROL_POINTS, Options, Solution, solve_with};
 
 /// Rows `n · c − d`: these control points lie in the plane `n · p = d`.
@@ -121,8 +123,38 @@ fn misses(saddle: &BsplineSurface, surface: &BsplineSurface) -> [f64; 2] {
     [border.fold(0.0, |m: f64, d| m.max(d.abs())), moved.x.hypot(moved.y)]
 }
 
+/// Points along each side of a picture.
+const POINTS: usize = 81;
+/// Colours of the pictures reach from this far before the facade to this far behind, in millimetres
+/// of a model in metres.
+const DEEPEST: f64 = 25.0;
+
+/// The surface in colours that say how far each point went across the facade.
+fn pictured(
+    name: &str,
+    saddle: &BsplineSurface,
+    surface: &BsplineSurface,
+) -> Result<SurfaceView, Box<dyn std::error::Error>> {
+    let share = |i: usize| i as f64 / (POINTS - 1) as f64;
+    let (mut points, mut normals, mut across) = (Vec::new(), Vec::new(), Vec::new());
+    for (u, v) in (0..POINTS * POINTS).map(|k| (share(k / POINTS), share(k % POINTS))) {
+        let jet = surface.jet(u, v, 1);
+        points.push(jet.position());
+        normals.push(jet.normal()?);
+        across.push(1e3 * (jet.position().x - saddle.point(u, v).x));
+    }
+    let field = ScalarField {
+        range: Some([-DEEPEST, DEEPEST]),
+        ..ScalarField::signed("across", "way across the facade", "mm", across)
+    };
+    let triangles = SurfaceView::grid_triangles(POINTS, POINTS);
+    let view = SurfaceView::new(name, points, normals, triangles)?;
+    Ok(view.with_field(field)?)
+}
+
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let path = std::env::args().nth(1).unwrap_or_else(|| "own-constraints.glb".to_owned());
+    let mut pictures = Report::new("A saddle with a facade", "");
     let saddle = fixtures::surfaces::Shape::Saddle.surface(10, 8, 4, 4);
     for (name, constrained) in [("without", false), ("with", true)] {
         let solution = optimised(&saddle, constrained)?;
@@ -131,10 +163,16 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
             "{name:>8}: diagram {:.5} of its box, border {border:.1e} off the facade, middle moved {middle:.1e}",
             solution.metrics.diagram_area,
         );
+        pictures.stages.push(pictured(name, &saddle, &solution.result)?);
         if constrained {
             let model = exchange::Model::of_surface("saddle", solution.result, Default::default());
             std::fs::write(&path, exchange::encode_model(path.as_ref(), &model)?)?;
             println!("written: {path}");
+        }
+    }
+    if let Some(folder) = std::env::args().nth(2) {
+        for figure in pictures.figures()?.iter().filter(|f| f.name.ends_with(".png")) {
+            std::fs::write(std::path::Path::new(&folder).join(&figure.name), &figure.bytes)?;
         }
     }
     Ok(())

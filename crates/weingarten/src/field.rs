@@ -76,7 +76,7 @@ impl LaneKernel<THIRD> for SampleKernel<'_> {
     }
 }
 
-/// Evaluates every sample, `[i * m_v + j]`.
+/// Evaluates every sample that counts, in the order of [`SampleGrid::place`].
 pub(crate) fn samples(grid: &SampleGrid, x: &[f64]) -> Vec<Sample> {
     let unrolled = grid.unroll(x);
     let stride = grid.stride();
@@ -103,7 +103,12 @@ pub(crate) fn samples(grid: &SampleGrid, x: &[f64]) -> Vec<Sample> {
         };
         (0..grid.v.len()).map(at)
     };
-    (0..grid.u.len()).into_par_iter().with_min_len(4).flat_map_iter(row).collect()
+    let all: Vec<Sample> =
+        (0..grid.u.len()).into_par_iter().with_min_len(4).flat_map_iter(row).collect();
+    if grid.count() == all.len() {
+        return all;
+    }
+    (0..grid.count()).map(|k| all[grid.place(k)]).collect()
 }
 
 struct DeltaKernel<'a> {
@@ -145,7 +150,7 @@ impl LaneKernel<FOURTH> for ParallelScale<'_> {
     }
 }
 
-/// `|∇_s ψ| |∇_s f|` at every sample, `ψ = |∇_s f|²`; `samples` are those of the same grid.
+/// `|∇_s ψ| |∇_s f|` at every sample that counts, `ψ = |∇_s f|²`; `samples` are those of the same grid.
 pub(crate) fn parallel_gradients(
     grid: &SampleGrid,
     field: Field,
@@ -156,11 +161,15 @@ pub(crate) fn parallel_gradients(
     let (stride, m_v) = (grid.stride(), grid.v.len());
     let mut scratch = Scratch::default();
     let mut out = vec![0.0; 4 * stride];
-    let mut result = Vec::with_capacity(grid.len());
+    let mut result = Vec::with_capacity(samples.len());
     for i in 0..grid.u.len() {
         grid.sweep(i, &unrolled, &mut scratch, &mut ParallelScale { field, out: &mut out, stride });
-        for j in 0..m_v {
-            let s = &samples[i * m_v + j];
+        while let Some(s) = samples.get(result.len()) {
+            let place = grid.place(result.len());
+            if place / m_v != i {
+                break;
+            }
+            let j = place % m_v;
             let v = |row: usize| out[row * stride + j];
             let norm = |a: f64, b: f64| (s.g * a * a - 2.0 * s.f * a * b + s.e * b * b) / s.delta();
             result.push((norm(v(0), v(1)) * norm(v(2), v(3))).max(0.0).sqrt());

@@ -5,7 +5,7 @@
 
 use std::borrow::Cow;
 
-use bspline::BsplineSurface;
+use bspline::{BsplineSurface, Region, Trim};
 use gp_solver::Elements;
 
 use crate::axis::Axis;
@@ -20,6 +20,16 @@ pub(crate) struct SampleGrid {
     pub(crate) u: Axis,
     pub(crate) v: Axis,
     pub(crate) rational: Option<Rational>,
+    inside: Option<Inside>,
+}
+
+/// Which samples of a grid count, if not all do.
+#[derive(Clone, Debug)]
+struct Inside {
+    /// Their numbers, rising.
+    places: Vec<usize>,
+    /// The others of every row of samples, by their place in the row.
+    others: Vec<Vec<usize>>,
 }
 
 impl SampleGrid {
@@ -27,7 +37,40 @@ impl SampleGrid {
     pub(crate) fn new(surface: &BsplineSurface, u: Vec<f64>, v: Vec<f64>) -> Self {
         let (u, v) = (Axis::new(surface.knots_u(), u), Axis::new(surface.knots_v(), v));
         let rational = surface.weights().map(|weights| Rational::new(&u, &v, weights));
-        Self { u, v, rational }
+        Self { u, v, rational, inside: None }
+    }
+
+    /// The same grid with only the samples within `trim` counting: of the others no row asks
+    /// anything, and the surface may be singular there.
+    pub(crate) fn within(mut self, trim: Option<&Trim>, surface: &BsplineSurface) -> Self {
+        let Some(trim) = trim else { return self };
+        let region = Region::new(trim, surface);
+        let mut places = Vec::with_capacity(self.len());
+        let mut others = vec![Vec::new(); self.u.len()];
+        for s in 0..self.len() {
+            let [u, v] = self.parameters(s);
+            match region.contains(u, v) {
+                true => places.push(s),
+                false => others[s / self.v.len()].push(s % self.v.len()),
+            }
+        }
+        self.inside = Some(Inside { places, others });
+        self
+    }
+
+    /// The number of the `k`-th sample that counts.
+    pub(crate) fn place(&self, k: usize) -> usize {
+        self.inside.as_ref().map_or(k, |inside| inside.places[k])
+    }
+
+    /// How many samples count.
+    pub(crate) fn count(&self) -> usize {
+        self.inside.as_ref().map_or(self.len(), |inside| inside.places.len())
+    }
+
+    /// The samples of row `i` that do not count.
+    pub(crate) fn others(&self, i: usize) -> &[usize] {
+        self.inside.as_ref().map_or(&[], |inside| &inside.others[i])
     }
 
     /// `m_u × m_v` samples at equal parameter distances, ends included, a period's end excluded.

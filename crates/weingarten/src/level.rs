@@ -2,7 +2,8 @@
 
 use std::sync::Arc;
 
-use bspline::BsplineSurface;
+use bspline::{BsplineSurface, Trim};
+use geom_core::Normalization;
 use gp_solver::{Closeness, Problem, Stage};
 
 use crate::blocks::{Alignment, BorderGlide, Fairness, Net, Parallel, RelationRows, Shape};
@@ -12,7 +13,7 @@ use crate::kernel::Field;
 use crate::options::{Border, Options};
 use crate::sampled::{SampledSurface, curvature_size, regular_samples, sample_counts};
 use crate::target::Target;
-use crate::variables::{control_points, coordinates, variables};
+use crate::variables::{control_points, coordinates, scaled, variables};
 
 /// Weight of gliding borders against distances on the working scale: large enough that the border
 /// stays on its curve to some 1e-4 of the size of the surface.
@@ -31,15 +32,17 @@ pub(crate) struct Level {
 }
 
 impl Level {
-    /// The level of a reference on the working scale.
+    /// The level of a reference on the working scale, of which the part within `trim` counts.
     pub(crate) fn new(
         reference: BsplineSurface,
+        trim: Option<&Trim>,
         samples: Option<gp_solver::Counts>,
         stage: Stage,
     ) -> Result<Self, Error> {
-        let grid = Arc::new(SampleGrid::uniform(&reference, sample_counts(&reference, samples)));
+        let grid = SampleGrid::uniform(&reference, sample_counts(&reference, samples));
+        let grid = Arc::new(grid.within(trim, &reference));
         let samples = regular_samples(&grid, &coordinates(&reference))?;
-        let curvature = curvature_size(&reference, &samples)?.unwrap_or(1.0);
+        let curvature = curvature_size(&reference, &samples).unwrap_or(1.0);
         Ok(Self { reference, grid, curvature, stage })
     }
 
@@ -58,6 +61,19 @@ impl Level {
         surface
             .refit(self.reference.knots_u(), self.reference.knots_v())
             .map_err(|source| Error::Level { level: self.stage.name.clone(), source })
+    }
+
+    /// The control points of a start, given where the model stands, as this level's.
+    pub(crate) fn started(
+        &self,
+        start: &BsplineSurface,
+        place: &Normalization,
+    ) -> Result<Vec<f64>, Error> {
+        let start = scaled(&start.translated(-place.center()), self.stage.unit)?;
+        let is_level = start.knots_u() == self.reference.knots_u()
+            && start.knots_v() == self.reference.knots_v()
+            && start.weights() == self.reference.weights();
+        Ok(coordinates(&if is_level { start } else { self.refitted(&start)? }))
     }
 
     /// The surface with these coordinates.

@@ -31,6 +31,7 @@ mod curve;
 mod error;
 mod field;
 mod grid;
+mod input;
 mod kernel;
 mod level;
 mod lifted;
@@ -52,6 +53,7 @@ mod variables;
 
 pub use error::Error;
 pub use gp_solver::Status;
+pub use input::Input;
 pub use locus::RelationLocus;
 pub use metrics::Metrics;
 pub use options::{Border, Formulation, Move, Options};

@@ -26,6 +26,14 @@ pub enum Formulation {
 choices!(Formulation { Reduced = "reduced", Lifted = "lifted" });
 
 /// What the border may do.
+///
+/// # Example
+/// ```
+/// use gp_solver::OptionValue;
+/// use weingarten::Border;
+/// assert_eq!(Border::read("glide"), Ok(Border::Glide));
+/// assert_eq!(Border::default(), Border::Free);
+/// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Border {
@@ -41,6 +49,13 @@ pub enum Border {
 choices!(Border { Free = "free", Glide = "glide", Fixed = "fixed" });
 
 /// A control point of the input to move before optimising: the moved surface is the reference.
+///
+/// # Example
+/// ```
+/// use gp_solver::OptionValue;
+/// use weingarten::Move;
+/// assert_eq!(Move::read("3,4,0,0,0.1"), Ok(Move { i: 3, j: 4, by: [0.0, 0.0, 0.1] }));
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Move {
     /// Index in u, from 0.
@@ -81,6 +96,21 @@ options! {
     /// Settings of an optimisation.
     ///
     /// Weights multiply residuals on the surface scaled to mean absolute principal curvature 5.
+    ///
+    /// # Example
+    /// ```
+    /// use gp_solver::Counts;
+    /// use weingarten::{Border, Options, Relation};
+    /// let options = Options {
+    ///     levels: vec![Counts { u: 10, v: 8 }, Counts { u: 14, v: 10 }].into(),
+    ///     border: Border::Glide,
+    ///     relation: Relation::ConstantMean(-0.5),
+    ///     ..Options::default()
+    /// };
+    /// assert_eq!((options.iterations, options.alignment_weight()), (10, 1.0));
+    /// // The table from which flags, configuration files and reports are made.
+    /// assert!(Options::FIELDS.iter().any(|field| field.name == "border"));
+    /// ```
     #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
     #[serde(default, deny_unknown_fields)]
     pub struct Options {

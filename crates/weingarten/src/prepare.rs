@@ -52,7 +52,7 @@ fn reduced(level: &Level, options: &Options, origin: &[f64]) -> Result<Prepared,
             damping_rule: DampingRule::Fivefold,
             gradient_tol: GRADIENT_TOL,
             step_tol: STEP_TOL,
-            abs_energy_tol: 0.5 * level.grid.len() as f64 * rounding * rounding,
+            abs_energy_tol: 0.5 * level.grid.count() as f64 * rounding * rounding,
             ..SolverOptions::default()
         },
     })

@@ -33,7 +33,7 @@ impl SampledSurface {
     /// the counts allow.
     ///
     /// # Errors
-    /// [`Error::Singular`] at a pole, a cusp or a collapsed edge, [`Error::NoExtent`].
+    /// [`Error::Singular`] at a pole, a cusp or a collapsed edge.
     ///
     /// ```
     /// use gp_solver::{Counts, check_jacobian};
@@ -49,7 +49,7 @@ impl SampledSurface {
         let grid = Arc::new(SampleGrid::uniform(surface, [samples.u, samples.v]));
         let x = coordinates(surface);
         let samples = regular_samples(&grid, &x)?;
-        let curvature = curvature_size(surface, &samples)?.unwrap_or(1.0);
+        let curvature = curvature_size(surface, &samples).unwrap_or(1.0);
         Ok(Self { grid, x, samples, curvature })
     }
 
@@ -61,8 +61,11 @@ impl SampledSurface {
     }
 }
 
-/// The samples of a surface, each checked to be regular.
+/// The samples of a surface that count, each checked to be regular.
 pub(crate) fn regular_samples(grid: &SampleGrid, x: &[f64]) -> Result<Vec<Sample>, Error> {
+    if grid.count() == 0 {
+        return Err(Error::NothingInside);
+    }
     let samples = samples(grid, x);
     let singular = |s: &Sample| {
         let first = FirstForm { e: s.e, f: s.f, g: s.g };
@@ -70,7 +73,7 @@ pub(crate) fn regular_samples(grid: &SampleGrid, x: &[f64]) -> Result<Vec<Sample
     };
     match samples.iter().position(singular) {
         Some(k) => {
-            let [u, v] = grid.parameters(k);
+            let [u, v] = grid.parameters(grid.place(k));
             Err(Error::Singular { u, v })
         }
         None => Ok(samples),
@@ -83,21 +86,17 @@ pub(crate) fn sample_counts(surface: &BsplineSurface, samples: Option<Counts>) -
 }
 
 /// Mean absolute principal curvature of samples of a surface, `None` where nothing is curved.
-pub(crate) fn curvature_size(
-    surface: &BsplineSurface,
-    samples: &[Sample],
-) -> Result<Option<f64>, Error> {
+pub(crate) fn curvature_size(surface: &BsplineSurface, samples: &[Sample]) -> Option<f64> {
     let mean = |s: &Sample| {
         let (k1, k2) = s.principal();
         0.5 * (k1.abs() + k2.abs())
     };
     let curvature = samples.iter().map(mean).sum::<f64>() / samples.len() as f64;
-    Ok((curvature * extent(surface)? > FLAT_RATIO).then_some(curvature))
+    (curvature * extent(surface) > FLAT_RATIO).then_some(curvature)
 }
 
-/// Diagonal of the bounding box of the control points.
-pub(crate) fn extent(surface: &BsplineSurface) -> Result<f64, Error> {
-    let diagonal = BoundingBox::of(surface.control_points().iter().copied())
-        .map_or(0.0, BoundingBox::diagonal);
-    if diagonal > 0.0 { Ok(diagonal) } else { Err(Error::NoExtent) }
+/// Diagonal of the bounding box of the control points: a size that costs nothing, for what does not
+/// depend on a factor of two.
+fn extent(surface: &BsplineSurface) -> f64 {
+    BoundingBox::of(surface.control_points().iter().copied()).map_or(0.0, BoundingBox::diagonal)
 }

@@ -1,14 +1,16 @@
 //! What is solved one after the other: the input refitted to each net, on one working scale.
 
-use bspline::{BsplineSurface, Degree, KnotError, KnotVector};
+use bspline::{BsplineSurface, Degree, KnotError, KnotVector, Trim};
+use geom_core::Normalization;
 use glam::DVec3;
 use gp_solver::{Counts, Stage};
 
 use crate::error::Error;
 use crate::grid::SampleGrid;
+use crate::input::Input;
 use crate::level::Level;
-use crate::options::{Move, Options};
-use crate::sampled::{curvature_size, extent, regular_samples, sample_counts};
+use crate::options::{Formulation, Move, Options};
+use crate::sampled::{curvature_size, regular_samples, sample_counts};
 use crate::variables::{coordinates, scaled};
 
 /// Mean absolute principal curvature on the working scale (Pellis et al. 2021, Table 1).
@@ -18,21 +20,34 @@ const WORKING_CURVATURE: f64 = 5.0;
 const LEAST_DEGREE: usize = 3;
 
 /// The levels of a run, coarse to fine.
-pub(crate) struct Schedule {
-    /// The reference of every level, in units of the model.
+pub(crate) struct Schedule<'a> {
+    /// The reference of every level, in units of the model, centred.
     nets: Vec<BsplineSurface>,
     /// Working lengths per length of the model.
     unit: f64,
+    /// The point of the model that is the origin of everything here.
+    center: DVec3,
     samples: Option<Counts>,
+    trim: Option<&'a Trim>,
 }
 
-impl Schedule {
-    pub(crate) fn new(surface: &BsplineSurface, options: &Options) -> Result<Self, Error> {
+impl<'a> Schedule<'a> {
+    /// The levels of a surface whose centre has been moved from its `place` to the origin.
+    pub(crate) fn new(
+        centred: Input<'a>,
+        place: &Normalization,
+        options: &Options,
+    ) -> Result<Self, Error> {
         options.check()?;
+        let Input { surface, trim, .. } = centred;
+        if trim.is_some() && options.formulation == Formulation::Lifted {
+            return Err(Error::NeedsReduced { what: "a trimmed surface" });
+        }
+        let (center, size) = (place.center(), place.size());
         let input = moved(surface, &options.moves)?;
         let nets = nets(&input, &options.levels)?;
-        let unit = working_unit(&nets[0], options.samples)?;
-        Ok(Self { nets, unit, samples: options.samples })
+        let unit = working_unit(&nets[0], trim, size, options.samples)?;
+        Ok(Self { nets, unit, center, samples: options.samples, trim })
     }
 
     /// Number of levels.
@@ -44,8 +59,8 @@ impl Schedule {
     pub(crate) fn level(&self, number: usize) -> Result<Level, Error> {
         let reference = scaled(&self.nets[number], self.unit)?;
         let name = Counts { u: reference.n_u(), v: reference.n_v() }.to_string();
-        let stage = Stage::new(name, number, self.len()).at([0.0; 3], self.unit);
-        Level::new(reference, self.samples, stage)
+        let stage = Stage::new(name, number, self.len()).at(self.center.to_array(), self.unit);
+        Level::new(reference, self.trim, self.samples, stage)
     }
 }
 
@@ -97,10 +112,15 @@ fn uniform_like(like: &KnotVector, n: usize) -> Result<KnotVector, KnotError> {
 }
 
 /// Working lengths per length of the model.
-fn working_unit(surface: &BsplineSurface, samples: Option<Counts>) -> Result<f64, Error> {
-    let extent = extent(surface)?;
+fn working_unit(
+    surface: &BsplineSurface,
+    trim: Option<&Trim>,
+    size: f64,
+    samples: Option<Counts>,
+) -> Result<f64, Error> {
     let grid = SampleGrid::uniform(surface, sample_counts(surface, samples));
+    let grid = grid.within(trim, surface);
     let samples = regular_samples(&grid, &coordinates(surface))?;
-    let curvature = curvature_size(surface, &samples)?;
-    Ok(curvature.map_or(1.0 / extent, |curvature| curvature / WORKING_CURVATURE))
+    let curvature = curvature_size(surface, &samples);
+    Ok(curvature.map_or(1.0 / size, |curvature| curvature / WORKING_CURVATURE))
 }

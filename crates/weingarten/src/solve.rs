@@ -2,27 +2,45 @@
 
 use std::ops::ControlFlow;
 
-use bspline::BsplineSurface;
+use bspline::{BsplineSurface, Flaw};
 use gp_solver::{
     Checkpoint, Extra, Fingerprint, Observer, Problem, Progress, Run, RunReport, Stage,
     StageReport, Status, System,
 };
 
 use crate::error::Error;
+use crate::input::Input;
 use crate::level::Level;
 use crate::locus::RelationLocus;
 use crate::metrics::{Meter, Metrics};
-use crate::options::Options;
+use crate::options::{Formulation, Options};
 use crate::prepare::prepared;
 use crate::sampled::SampledSurface;
 use crate::schedule::Schedule;
 use crate::target::Target;
 use crate::variables::{coordinates, scaled};
 
+/// Over how many last steps it is told what they changed.
+const LAST_STEPS: usize = 10;
 /// The name of the method in checkpoints.
 const METHOD: &str = "weingarten";
 
 /// An optimised surface with what is to be said about it.
+///
+/// # Example
+/// ```
+/// use weingarten::{Options, Status, solve};
+/// let roof = fixtures::surfaces::Shape::Roof.surface(8, 7, 4, 4);
+/// let options = Options { iterations: 3, ..Options::default() };
+/// let solution = solve(&roof, &options, &mut ())?;
+/// assert_eq!(solution.report.status, Status::IterationLimit);
+/// assert_eq!((solution.result.n_u(), solution.samples), (8, [16, 14]));
+/// // What the steps did, term by term.
+/// let history = &solution.report.stages[0].solver.history;
+/// assert_eq!(history.len(), 4);
+/// assert!(history[3].energy < history[0].energy);
+/// # Ok::<(), weingarten::Error>(())
+/// ```
 #[derive(Clone, Debug)]
 pub struct Solution {
     /// The surface, in units of the model.
@@ -43,9 +61,16 @@ pub struct Solution {
     /// Standard deviations of `H` and `K` at the start, on the working scale, if there is a
     /// relation: distances from fitted lines and curves are in units of them.
     pub relation_scale: Option<[f64; 2]>,
+    /// Where the result is torn or folded between the samples, checked on a grid ten times as dense;
+    /// the status of the report is [`Status::Failed`] then.
+    pub flaws: Vec<Flaw>,
+    /// How many steps before the end, ten at most, and what the metrics were there; none where the
+    /// run ended otherwise than by the number of steps.
+    pub earlier: Option<(usize, Metrics)>,
 }
 
-/// Optimises `surface` towards a Weingarten surface near to it.
+/// Optimises a surface (`&BsplineSurface`, or an [`Input`]) towards a Weingarten surface near to
+/// it.
 ///
 /// # Errors
 /// [`Error`] for what cannot be attempted. Not converging is a [`Status`] of the report.
@@ -66,12 +91,12 @@ pub struct Solution {
 /// assert!(solution.metrics.alignment_rms < 0.1 * solution.before.alignment_rms);
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
-pub fn solve(
-    surface: &BsplineSurface,
+pub fn solve<'a>(
+    input: impl Into<Input<'a>>,
     options: &Options,
     observer: &mut dyn Observer,
 ) -> Result<Solution, Error> {
-    solve_with(surface, options, &mut |_, _, _| Ok(()), observer)
+    solve_with(input, options, &mut |_, _, _| Ok(()), observer)
 }
 
 /// As [`solve`], with blocks of one's own: `extra` is called whenever a level has built its problem
@@ -97,21 +122,36 @@ pub fn solve(
 /// assert!(moved < 1e-12);
 /// # Ok::<(), weingarten::Error>(())
 /// ```
-pub fn solve_with(
-    surface: &BsplineSurface,
+pub fn solve_with<'a>(
+    input: impl Into<Input<'a>>,
     options: &Options,
     extra: &mut Extra<'_, Error>,
     observer: &mut dyn Observer,
 ) -> Result<Solution, Error> {
-    let schedule = Schedule::new(surface, options)?;
-    let fingerprint = fingerprint(surface, options);
+    let given = input.into();
+    let place = given.surface.normalization()?;
+    let centred = given.surface.translated(-place.center());
+    let input = Input { surface: &centred, ..given };
+    if let Some(start) = given.start {
+        if options.formulation == Formulation::Lifted {
+            return Err(Error::NeedsReduced { what: "a start" });
+        }
+        check_domain(given.surface, start)?;
+    }
+    let schedule = Schedule::new(input, &place, options)?;
+    let fingerprint = fingerprint(given, options);
     let resume = observer.resume();
     if let Some(checkpoint) = &resume {
         checkpoint.check(METHOD, fingerprint)?;
     }
     let first = resume.as_ref().map_or(0, |c| c.stage);
+    let mut steps = match &resume {
+        Some(checkpoint) => checkpoint.counts("steps")?.first().map_or(0, |n| *n as usize),
+        None => 0,
+    };
     let mut stages: Vec<StageReport> = Vec::new();
     let mut done: Option<(Level, SampledSurface, BsplineSurface)> = None;
+    let mut earlier: Option<(usize, Vec<f64>)> = None;
     for number in first..schedule.len() {
         let level = schedule.level(number)?;
         let resumed = resume.as_ref().filter(|c| c.stage == number);
@@ -120,14 +160,27 @@ pub fn solve_with(
             (None, None) => coordinates(&level.reference),
             (Some((.., working)), None) => coordinates(&level.refitted(working)?),
         };
-        let solved = prepared(&level, options, &origin, extra)?;
+        let mut solved = prepared(&level, options, &origin, extra)?;
+        // The terms are those of the reference, wherever the run begins.
+        if let (None, None, Some(start)) = (&done, resumed, given.start) {
+            solved.x = level.started(start, &place)?;
+        }
         let system = System::new(solved.problem, solved.options.factorization)?;
         let mut run = Run::new(system, &solved.x, &solved.options)?;
         if let Some(checkpoint) = resumed {
             run.resume(checkpoint)?;
         }
-        let mut watch = Watch { observer, stage: &level.stage, start: &origin, fingerprint };
+        let mut watch = Watch {
+            observer,
+            stage: &level.stage,
+            start: &origin,
+            steps,
+            fingerprint,
+            earlier: None,
+        };
         let status = run.go_on(&level.stage, &mut watch)?;
+        earlier = watch.earlier.filter(|_| status == Status::IterationLimit);
+        steps += run.iterations();
         let working = level.surface(&run.x()[..level.unknowns()])?;
         stages.push(StageReport { stage: level.stage.clone(), solver: run.report(status) });
         let start = level.sampled(&origin)?;
@@ -140,56 +193,123 @@ pub fn solve_with(
         let what = "a run with more levels".to_owned();
         return Err(gp_solver::SolverError::ForeignCheckpoint { what }.into());
     };
-    finish(surface, options, &level, &start, &working, stages)
+    let report = RunReport { iterations: steps, ..RunReport::of_stages(stages) };
+    // A net nothing has moved is the input itself, to the last bit.
+    let is_input = steps == 0 && options.levels.is_empty() && options.moves.is_empty();
+    let working = if is_input { None } else { Some(&working) };
+    let finished = finish(input, place.size(), options, &level, &start, working, earlier, report)?;
+    let result =
+        if is_input { given.surface.clone() } else { finished.result.translated(place.center()) };
+    Ok(Solution { result, ..finished })
 }
 
 /// The problem of the first level, at its start.
 ///
 /// # Errors
 /// As [`solve`].
-pub fn problem(surface: &BsplineSurface, options: &Options) -> Result<Problem<'static>, Error> {
-    let level = Schedule::new(surface, options)?.level(0)?;
+///
+/// # Example
+/// ```
+/// use weingarten::{CONTROL_POINTS, Options, problem};
+/// let roof = fixtures::surfaces::Shape::Roof.surface(8, 7, 4, 4);
+/// let problem = problem(&roof, &Options::default())?;
+/// assert_eq!(problem.variables().group(CONTROL_POINTS)?.shape(), [8, 7]);
+/// assert!(problem.blocks().any(|(_, name)| name == "alignment"));
+/// # Ok::<(), weingarten::Error>(())
+/// ```
+pub fn problem<'a>(
+    input: impl Into<Input<'a>>,
+    options: &Options,
+) -> Result<Problem<'static>, Error> {
+    let given = input.into();
+    let place = given.surface.normalization()?;
+    let centred = given.surface.translated(-place.center());
+    let level = Schedule::new(Input { surface: &centred, ..given }, &place, options)?.level(0)?;
     let origin = coordinates(&level.reference);
     Ok(prepared(&level, options, &origin, &mut |_, _, _| Ok(()))?.problem)
 }
 
-/// Back to the model's units, measured and put together.
+/// Back to the model's units, but still centred, measured and put together. Curvatures are measured
+/// here because far from the origin rounding would eat their derivatives.
 fn finish(
-    input: &BsplineSurface,
+    input: Input<'_>,
+    size: f64,
     options: &Options,
     level: &Level,
     start: &SampledSurface,
-    working: &BsplineSurface,
-    stages: Vec<StageReport>,
+    working: Option<&BsplineSurface>,
+    earlier: Option<(usize, Vec<f64>)>,
+    mut report: RunReport,
 ) -> Result<Solution, Error> {
-    let report = RunReport::of_stages(stages);
-    // A net nothing has moved is the input itself, to the last bit.
-    let is_input = report.iterations == 0 && options.levels.is_empty() && options.moves.is_empty();
-    let result = if is_input { input.clone() } else { scaled(working, 1.0 / level.stage.unit)? };
+    let result = match working {
+        Some(working) => scaled(working, 1.0 / level.stage.unit)?,
+        None => input.surface.clone(),
+    };
     let target = level.target(options, start);
     let samples = [level.grid.u.len(), level.grid.v.len()];
-    let meter = Meter::new(input, samples, level.stage.unit);
+    let mut flaws =
+        if report.iterations > 0 { result.flaws_against(input.surface) } else { Vec::new() };
+    if let Some(trim) = input.trim {
+        flaws.retain(|flaw| trim.contains(flaw.u, flaw.v));
+    }
+    if !flaws.is_empty() && report.status != Status::Interrupted {
+        report.status = Status::Failed;
+    }
+    let meter = Meter::new(input, size, samples, level.stage.unit);
+    let earlier = match earlier {
+        Some((steps, x)) => {
+            let surface = scaled(&level.surface(&x)?, 1.0 / level.stage.unit)?;
+            Some((steps, meter.measure(&surface, target.as_ref())))
+        }
+        None => None,
+    };
     Ok(Solution {
-        before: meter.measure(input, target.as_ref()),
+        before: meter.measure(input.surface, target.as_ref()),
         metrics: meter.measure(&result, target.as_ref()),
         relation: target.as_ref().map(|target| meter.locus(&result, target)),
         report,
+        earlier,
         result,
         samples,
+        flaws,
         working_scale: level.stage.unit,
         relation_scale: target.as_ref().map(Target::deviation),
     })
 }
 
+/// A start is compared with its reference parameter by parameter.
+fn check_domain(surface: &BsplineSurface, start: &BsplineSurface) -> Result<(), Error> {
+    let of = |s: &BsplineSurface| [s.knots_u().domain(), s.knots_v().domain()];
+    let closed = |s: &BsplineSurface| [s.knots_u().is_periodic(), s.knots_v().is_periodic()];
+    if of(surface) == of(start) && closed(surface) == closed(start) {
+        return Ok(());
+    }
+    Err(Error::OtherDomain)
+}
+
 /// Of everything a run depends on. More steps are no other run: a finished one may be taken further.
-fn fingerprint(surface: &BsplineSurface, options: &Options) -> u64 {
+fn fingerprint(input: Input<'_>, options: &Options) -> u64 {
+    let surface = input.surface;
     let mut of = Fingerprint::new();
     for point in surface.control_points() {
         of = of.numbers(&point.to_array());
     }
+    of = of.counts([surface.n_u() as u64, surface.n_v() as u64]);
     of = of.numbers(surface.knots_u().knots()).numbers(surface.knots_v().knots());
     if let Some(weights) = surface.weights() {
         of = of.numbers(weights);
+    }
+    for made in input.trim.iter().flat_map(|trim| trim.loops()) {
+        for curve in made.curves().iter().map(|c| &c.parameters) {
+            of = of.numbers(curve.knots().knots());
+            for point in curve.control_points() {
+                of = of.numbers(&point.to_array());
+            }
+            of = of.numbers(curve.weights().unwrap_or_default());
+        }
+    }
+    for point in input.start.iter().flat_map(|start| start.control_points()) {
+        of = of.numbers(&point.to_array());
     }
     let options = Options { iterations: 0, ..options.clone() };
     of.text(&format!("{options:?}")).finish()
@@ -200,13 +320,21 @@ struct Watch<'o> {
     observer: &'o mut dyn Observer,
     stage: &'o Stage,
     start: &'o [f64],
+    /// Steps of the levels that are done.
+    steps: usize,
     fingerprint: u64,
+    /// The control points some steps before the last one allowed, and how many.
+    earlier: Option<(usize, Vec<f64>)>,
 }
 
 impl Observer for Watch<'_> {
     fn step(&mut self, progress: &Progress<'_>) -> ControlFlow<()> {
         // Control points only: auxiliary variables of the lifted formulation stay behind.
         let x = &progress.x[..self.start.len()];
+        let left = progress.max_iterations.saturating_sub(progress.iteration);
+        if left > 0 && (self.earlier.is_none() || left >= LAST_STEPS) {
+            self.earlier = Some((left, x.to_vec()));
+        }
         self.observer.step(&Progress { x, ..*progress })
     }
 
@@ -216,8 +344,9 @@ impl Observer for Watch<'_> {
 
     fn checkpoint(&mut self, state: &dyn Fn() -> Checkpoint) {
         let (stage, start, fingerprint) = (self.stage.number, self.start, self.fingerprint);
+        let steps = [self.steps as u64];
         self.observer.checkpoint(&|| {
-            let state = state().with_numbers("start", start);
+            let state = state().with_numbers("start", start).with_counts("steps", &steps);
             Checkpoint { method: METHOD.to_owned(), fingerprint, stage, ..state }
         });
     }

@@ -12,13 +12,13 @@ use crate::level::Level;
 use crate::lifted::{self, Definitions};
 use crate::metrics::Meter;
 use crate::variables::coordinates;
-use crate::{Options, Relation};
+use crate::{Input, Options, Relation};
 
 /// The level of a recorded scene, which is on the working scale already.
 fn recorded_level(scene: &fixtures::reference::Scene) -> (Level, Options) {
     let (u, v) = scene.samples;
     let options = Options { samples: Some(Counts { u, v }), ..Default::default() };
-    (Level::new(scene.surface(), options.samples, Stage::only("scene")).unwrap(), options)
+    (Level::new(scene.surface(), None, options.samples, Stage::only("scene")).unwrap(), options)
 }
 
 #[test]
@@ -63,7 +63,8 @@ fn metrics_of_recorded_nets_equal_the_recorded_ones() {
     for scene in fixtures::reference::scenes() {
         let surface = scene.surface();
         let samples = [scene.samples.0, scene.samples.1];
-        let metrics = Meter::new(&surface, samples, 1.0).measure(&surface, None);
+        let input = Input::from(&surface);
+        let metrics = Meter::new(input, 1.0, samples, 1.0).measure(&surface, None);
         assert_close(metrics.alignment_rms / scene.metrics_start.sin, 1.0, 1e-9);
         assert_close(metrics.diagram_area / scene.metrics_start.area, 1.0, 1e-9);
         assert_close(metrics.deviation_max_percent, 0.0, 1e-12);
@@ -173,7 +174,7 @@ fn jacobians_of_net_terms_match_central_differences() {
 fn lifted_jacobians_match_central_differences_and_the_start_satisfies_the_definitions() {
     for surface in small_surfaces() {
         let options = Options { samples: Some(Counts { u: 6, v: 5 }), ..Options::published() };
-        let level = Level::new(surface, options.samples, Stage::only("small")).unwrap();
+        let level = Level::new(surface, None, options.samples, Stage::only("small")).unwrap();
         let x = lifted::start(&level.grid, &coordinates(&level.reference)).unwrap();
         let problem = lifted::problem(&level, &options, &x).unwrap();
         let mut system = System::new(problem, Factorization::Sparse).unwrap();

@@ -2,15 +2,12 @@
 
 use super::tokens::{tokens_and_texts, without_tests};
 
-/// Crates whose messages still name flags or the program; this list may only become shorter.
-const EXCEPTED: &[&str] = &["exchange"];
-
 /// Looks at the texts of one source, `shown` is its path from the root.
 pub(crate) fn check(shown: &str, text: &str, faults: &mut Vec<String>) {
     let Some(name) = shown.strip_prefix("crates/").and_then(|s| s.split('/').next()) else {
         return;
     };
-    if name == "cli" || EXCEPTED.contains(&name) || !shown.contains("/src/") {
+    if name == "cli" || !shown.contains("/src/") {
         return;
     }
     for word in strays(text) {

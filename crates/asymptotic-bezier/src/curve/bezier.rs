@@ -89,6 +89,12 @@ impl BezierCurve {
         Self { points, offsets, normals: None }
     }
 
+    /// The same curve somewhere else; what is measured from its start stays to the last bit.
+    pub(crate) fn translated(mut self, by: DVec3) -> Self {
+        self.points.iter_mut().for_each(|p| *p += by);
+        self
+    }
+
     /// The same curve with the control points of its polynomial normal `N`, `r′ = ± N × N′`.
     pub(crate) fn with_normals(self, normals: Vec<DVec3>) -> Self {
         Self { normals: Some(normals), ..self }

@@ -218,8 +218,8 @@ fn extended(
     watch: &mut Watch<'_, '_>,
 ) -> Result<Option<FilledPatch>, Error> {
     let (n, origin) = (family.degree, family.origin);
-    let named = gp_solver::Stage { name: format!("{}", Place::Patch(f)), ..watch.stage().clone() };
-    let stage = named.at(origin.to_array(), 1.0);
+    let name = format!("{}", Place::Patch(f));
+    let stage = gp_solver::Stage { name, ..watch.stage_from(origin) };
     let (mut problem, points, planes) = family_problem(family);
     let before = Shape::of(&problem);
     watch.extend(&stage, &mut problem)?;

@@ -274,7 +274,7 @@ impl<'a> Reduced<'a> {
         watch: &mut Watch<'_, '_>,
     ) -> Result<Option<Vec<FilledPatch>>, Error> {
         let origin = self.joint.net.positions[0];
-        let stage = watch.stage().clone().at(origin.to_array(), 1.0);
+        let stage = watch.stage_from(origin);
         let (mut problem, points, planes) = self.problem();
         let before = Shape::of(&problem);
         watch.extend(&stage, &mut problem)?;

@@ -257,8 +257,8 @@ impl Chain {
             let index = (first + step) % edges.len();
             let edge = &edges[index];
             let before = chain.runs.last().map(Run::end);
-            let mut given: Vec<Run> =
-                edge.parameters.iter().filter_map(|p| Run::given(edge, p, chart)).collect();
+            let planar = edge.parameters.iter().filter(|_| chart.is_spline());
+            let mut given: Vec<Run> = planar.filter_map(|p| Run::given(edge, p, chart)).collect();
             // The place of a seam that continues the walk.
             if let Some(before) = before {
                 let gap = |run: &Run| {

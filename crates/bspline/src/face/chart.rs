@@ -7,6 +7,7 @@ use crate::error::SplineError;
 use crate::surface::BsplineSurface;
 use geom_core::BoundingBox;
 use glam::DVec3;
+use std::cell::OnceCell;
 
 /// An edge further from the surface than this share of the size of the loops is not on it.
 const OFF: f64 = 1e-3;
@@ -36,7 +37,8 @@ pub(super) struct Chart<'a> {
 
 enum Kind<'a> {
     Elementary(&'a Elementary),
-    Spline(SurfaceLocator<'a>, &'a BsplineSurface, Vec<(usize, f64, DVec3)>),
+    /// With the points of the poles; the locator is made when it is first needed.
+    Spline(OnceCell<SurfaceLocator<'a>>, &'a BsplineSurface, Vec<(usize, f64, DVec3)>),
 }
 
 impl<'a> Chart<'a> {
@@ -109,9 +111,8 @@ impl<'a> Chart<'a> {
         let bounds = domains.map(|(a, b)| [a, b]);
         let corners = surface.control_points().iter().copied();
         let size = BoundingBox::of(corners).map_or(0.0, BoundingBox::diagonal);
-        let locator = SurfaceLocator::new(surface, periods.map(|p| p.is_some()));
         Ok(Self {
-            kind: Kind::Spline(locator, surface, points),
+            kind: Kind::Spline(OnceCell::new(), surface, points),
             periods,
             bounds,
             poles,
@@ -143,7 +144,7 @@ impl<'a> Chart<'a> {
 
     /// How far apart ends of edges may be that are meant to meet, a length.
     pub(super) fn joint_slack(&self) -> f64 {
-        0.1 * self.off
+        self.off
     }
 
     /// What counts as nothing in a coordinate.
@@ -167,7 +168,10 @@ impl<'a> Chart<'a> {
                     None => Place { at, pole: None },
                 })
             }
-            Kind::Spline(locator, _, poles) => {
+            Kind::Spline(locator, surface, poles) => {
+                let locator = locator.get_or_init(|| {
+                    SurfaceLocator::new(surface, self.periods.map(|p| p.is_some()))
+                });
                 let hint =
                     hint.map(|hint| std::array::from_fn(|axis| self.inside(axis, hint[axis])));
                 let (at, distance) = locator.locate(point, hint, self.tolerance);

@@ -1,29 +1,43 @@
 //! `umbilic analyze INPUT`.
 
 use crate::args::ReportArgs;
+use crate::commands::analyze_list::Listing;
 use crate::context::Context;
 use crate::failure::Failure;
+use crate::input_file::{self, PartArgs, SurfaceArgs};
 use crate::outcome::{Outcome, Status};
 use crate::report_support;
 use curvature_variation::{Rings, SurfaceAnalysis, fitted_torus};
 use exchange::{Mesh, Model};
-use geom_core::{CurvatureStatistics, ValueRange, mesh_curvature_statistics};
+use geom_core::{CurvatureStatistics, DVec3, Normalization, ValueRange, mesh_curvature_statistics};
 use gp_solver::OptionValue;
 use serde::Serialize;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use subdiv_catmull_clark::Blend;
 
+/// Surfaces, and meshes, that the summary names one by one.
+const MOST_LINES: usize = 12;
+
 /// Arguments of `analyze`.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "\
 Examples:
   umbilic analyze fixtures/roof.ron --metrics roof.json
+  umbilic analyze fixtures/step/bracket.step --list
+  umbilic analyze fixtures/step/bracket.step --surface 1 --surface 2
   umbilic analyze fixtures/quads/clifford.obj --discrete-bending
 A mesh of quads is read as the control mesh of its Catmull-Clark surface.")]
 pub(crate) struct Analyze {
     /// File with surfaces or meshes; surfaces are preferred if it has both
     input: PathBuf,
+    #[command(flatten)]
+    surface: SurfaceArgs,
+    #[command(flatten)]
+    part: PartArgs,
+    /// Show a table of the surfaces and meshes in the file and measure no more
+    #[arg(long, conflicts_with_all = ["discrete_bending", "report", "figures"])]
+    list: bool,
     /// Also the edge-based bending energy of the faces themselves, to compare with the surface's
     #[arg(long)]
     discrete_bending: bool,
@@ -39,11 +53,21 @@ pub(crate) struct Analyze {
 impl Analyze {
     pub(crate) fn run(self, context: &Context) -> Result<Outcome, Failure> {
         self.report.check()?;
-        let model =
-            exchange::read_model(&self.input).map_err(|e| Failure::input(&self.input, e))?;
+        let model = input_file::read(context, &self.input, &self.surface, &self.part)?;
+        if self.list {
+            let listing = Listing::new(&model);
+            let outcome = Outcome::new(Status::Converged, 0).with_input(&self.input);
+            let mut outcome = outcome.with_metrics(&listing)?;
+            outcome.summary = listing.lines(&model.unit.to_string());
+            outcome.warnings.clone_from(&model.warnings);
+            return Ok(outcome);
+        }
         let rings = self.blend_rings.and_then(Rings::count);
+        // Near the origin nothing is lost to rounding.
+        let (centred, center) = centred(&model);
         let Measured { kind, statistics, subdivision, warnings } =
-            measure(&self.input, &model, rings)?;
+            measure(&self.input, &centred, rings)?;
+        let statistics = statistics.moved(center);
         let mut metrics = AnalyzeMetrics::new(kind, &statistics);
         metrics.subdivision = subdivision;
         if self.discrete_bending {
@@ -71,6 +95,26 @@ impl Analyze {
     }
 }
 
+/// A model moved to the origin, and by what it has been moved away from. One that has no place of
+/// its own stays.
+fn centred(model: &Model) -> (Model, DVec3) {
+    let mut model = model.clone();
+    let mut points: Vec<DVec3> = Vec::new();
+    for named in &model.surfaces {
+        points.extend(named.surface.control_points());
+    }
+    model.meshes.iter().for_each(|mesh| points.extend(&mesh.positions));
+    model.grids.iter().for_each(|grid| points.extend(&grid.points));
+    let Ok(place) = Normalization::of(&points) else { return (model, DVec3::ZERO) };
+    let by = -place.center();
+    for named in &mut model.surfaces {
+        named.surface = named.surface.translated(by);
+    }
+    model.meshes.iter_mut().flat_map(|mesh| &mut mesh.positions).for_each(|p| *p += by);
+    model.grids.iter_mut().flat_map(|grid| &mut grid.points).for_each(|p| *p += by);
+    (model, place.center())
+}
+
 /// What an input is and what it measures.
 struct Measured {
     kind: &'static str,
@@ -84,7 +128,7 @@ fn measure(path: &Path, model: &Model, rings: Option<usize>) -> Result<Measured,
     let (mut subdivision, mut warnings) = (None, Vec::new());
     if !model.surfaces.is_empty() {
         for named in &model.surfaces {
-            statistics.merge(&named.surface.curvature_statistics());
+            statistics.merge(&named.curvature_statistics());
         }
         let rational = model.surfaces.iter().any(|named| named.surface.is_rational());
         let kind = if rational { "rational_bspline_surface" } else { "bspline_surface" };
@@ -253,13 +297,19 @@ fn summary(
 ) -> Vec<String> {
     let unit = &model.unit;
     let mut lines = vec![format!("{}: {}", path.display(), kind.replace('_', " "))];
-    for named in &model.surfaces {
+    for named in model.surfaces.iter().take(MOST_LINES) {
         let s = &named.surface;
         let name = if named.name.is_empty() { "surface" } else { &named.name };
         let (d_u, d_v, n_u, n_v) = (s.degree_u(), s.degree_v(), s.n_u(), s.n_v());
-        lines.push(format!("  {name}: degree {d_u} x {d_v}, {n_u} x {n_v} control points"));
+        let trimmed = if named.trim.is_some() { ", trimmed" } else { "" };
+        lines
+            .push(format!("  {name}: degree {d_u} x {d_v}, {n_u} x {n_v} control points{trimmed}"));
     }
-    for mesh in &model.meshes {
+    let more = |n: usize, what: &str| {
+        n.checked_sub(MOST_LINES + 1).map(|n| format!("  and {} more {what}; see --list", n + 1))
+    };
+    lines.extend(more(model.surfaces.len(), "surfaces"));
+    for mesh in model.meshes.iter().take(MOST_LINES) {
         let counts = [
             (mesh.positions.len(), "vertices"),
             (mesh.faces.len(), "faces"),
@@ -270,6 +320,7 @@ fn summary(
         let name = if mesh.name.is_empty() { "mesh" } else { &mesh.name };
         lines.push(format!("  {name}: {}", counts.collect::<Vec<_>>().join(", ")));
     }
+    lines.extend(more(model.meshes.len(), "meshes"));
     if let Some(bounds) = statistics.bounding_box {
         let size = bounds.size();
         lines.push(format!("  size {:.6} x {:.6} x {:.6} {unit}", size.x, size.y, size.z));

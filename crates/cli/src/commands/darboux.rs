@@ -1,8 +1,9 @@
 //! `umbilic darboux NET -o OUT`.
 
-use crate::args::{ConfigArgs, ConvergedArgs, OutputArgs, ReportArgs};
+use crate::args::{ConfigArgs, EndingArgs, OutputArgs, ReportArgs};
 use crate::context::Context;
 use crate::failure::Failure;
+use crate::input_file::PartArgs;
 use crate::net_files::{self, NetInput};
 use crate::net_report;
 use crate::option_flags::{self, OptionFlags, in_flags};
@@ -28,6 +29,8 @@ pub(crate) struct Darboux {
     /// Net file, or quads along asymptotic directions (solved first)
     input: PathBuf,
     #[command(flatten)]
+    part: PartArgs,
+    #[command(flatten)]
     output: OutputArgs,
     #[command(flatten)]
     options: OptionFlags<Options>,
@@ -37,7 +40,7 @@ pub(crate) struct Darboux {
     #[command(flatten)]
     report: ReportArgs,
     #[command(flatten)]
-    converged: ConvergedArgs,
+    ending: EndingArgs,
 }
 
 /// The cage file.
@@ -55,8 +58,8 @@ impl Darboux {
         self.report.check()?;
         net_files::check_outputs(&self.output.output, &["glb", "obj", "ply", "stl"])?;
         let options = self.options()?;
-        let (input, unit, mut warnings) = net_files::read(&self.input)?;
-        let mut watch = Watch::new(context, "net");
+        let mut watch = Watch::new(context, "net").of(&self.input);
+        let (input, unit, mut warnings) = net_files::read(context, &self.input, &self.part)?;
         let (surface, status, steps) = match input {
             NetInput::Net(surface) => (*surface, Status::Converged, 0),
             NetInput::Mesh(mesh) => self.solve(&mesh, &mut watch, &mut warnings)?,
@@ -70,16 +73,17 @@ impl Darboux {
         let (metrics, sampled, corners) = (&image.metrics, &image.result, &image.corners);
         let mut outcome =
             Outcome::new(status, steps).with_input(&self.input).with_metrics(metrics)?;
-        outcome.require_converged = self.converged.require_converged;
+        self.ending.apply(&mut outcome);
+        outcome.summary = summary(metrics, &unit.to_string());
+        outcome.warnings = warnings;
+        if !watch.finish(&mut outcome) {
+            return Ok(outcome);
+        }
         for path in self.output.output {
             let mesh = net_files::sampled_mesh("Darboux transform", sampled);
             let model = Model::of_mesh(mesh, unit.clone());
-            let bytes =
-                exchange::encode_model(&path, &model).map_err(|e| Failure::input(&path, e))?;
-            outcome.files.push((path, bytes));
+            outcome.add_model(path, &model)?;
         }
-        outcome.summary = summary(metrics, &unit.to_string());
-        outcome.warnings = warnings;
         if self.report.wanted() {
             let mut page = net_report::page("Darboux transform", &self.input, &unit);
             net_report::add_net(&mut page, &surface, &unit.to_string())?;

@@ -4,7 +4,7 @@ use crate::args::ReportArgs;
 use crate::commands::weingarten::outcome;
 use crate::context::Context;
 use crate::failure::Failure;
-use crate::outcome::{Outcome, Status};
+use crate::outcome::Outcome;
 use crate::panel_files::encode;
 use crate::report_support;
 use crate::report_support::panels::{gap_histogram, kink_histogram, panel_view, seam_table};
@@ -67,9 +67,8 @@ impl Demo {
         let mut watch = Watch::new(context, "optimising");
         let solution =
             weingarten::solve(&named.surface, &options, &mut watch).map_err(Failure::other)?;
-        drop(watch);
         let mut outcome = outcome(&solution, &options, &model.unit)?;
-        if outcome.status == Status::Interrupted {
+        if !watch.finish(&mut outcome) {
             return Ok(outcome);
         }
         let cut = Panelings::new(&named.surface, &solution.result)?;
@@ -79,7 +78,7 @@ impl Demo {
         outcome.summary.extend(cut.summary());
 
         let unit = model.unit.to_string();
-        let mut report = weingarten_report(&named.surface, &solution, &options, &unit)?;
+        let mut report = weingarten_report(named, &solution, &options, &unit)?;
         cut.describe(&mut report)?;
         let result = Model::of_surface("roof", solution.result, model.unit.clone());
         for path in [step, glb] {

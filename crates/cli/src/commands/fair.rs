@@ -1,8 +1,10 @@
 //! `umbilic fair QUADS -o OUT`.
 
-use crate::args::{CheckpointArgs, ConfigArgs, ConvergedArgs, OutputArgs, ReportArgs};
+use crate::args::{ConfigArgs, EndingArgs, OutputArgs, ReportArgs};
+use crate::checkpoints::CheckpointArgs;
 use crate::context::Context;
 use crate::failure::Failure;
+use crate::input_file::{self, PartArgs, SurfaceArgs};
 use crate::option_flags::{OptionFlags, list, refused};
 use crate::outcome::Outcome;
 use crate::report_support;
@@ -13,6 +15,7 @@ use curvature_variation::{
 };
 use exchange::{Field, LengthUnit, Mesh, Model, NamedSurface};
 use geom_core::{DVec3, UmbilicKind};
+use gp_solver::SolverError;
 use report::{EnergyHistory, FieldScale, LineRole, LineSet, ScalarField, Series, SurfaceView};
 use serde::Deserialize;
 use std::collections::BTreeMap;
@@ -31,6 +34,8 @@ pub(crate) struct Fair {
     /// Control mesh of quads or n-gons; the surface is its Catmull-Clark limit
     input: PathBuf,
     #[command(flatten)]
+    part: PartArgs,
+    #[command(flatten)]
     output: OutputArgs,
     #[command(flatten)]
     options: OptionFlags<Options>,
@@ -41,7 +46,7 @@ pub(crate) struct Fair {
     #[command(flatten)]
     checkpoint: CheckpointArgs,
     #[command(flatten)]
-    converged: ConvergedArgs,
+    ending: EndingArgs,
     #[command(flatten)]
     report: ReportArgs,
 }
@@ -73,12 +78,25 @@ impl Fair {
                 "--family leaves no vertex to fix; drop --fix, --creases and --clamp-boundary",
             ));
         }
-        let model =
-            exchange::read_model(&self.input).map_err(|e| Failure::input(&self.input, e))?;
+        let mut watch =
+            Watch::new(context, "fairing").of(&self.input).with_checkpoints(&self.checkpoint)?;
+        let model = input_file::read(context, &self.input, &SurfaceArgs::default(), &self.part)?;
         let input = self.read(&model)?;
-        let mut watch = Watch::new(context, "fairing").with_checkpoints(&self.checkpoint)?;
-        let mut result = solve(&input, &options, &mut watch).map_err(|e| self.refused(&e))?;
+        let mut result = solve(&input, &options, &mut watch).map_err(|e| match e {
+            Error::Solver(e @ SolverError::ForeignCheckpoint { .. }) => watch.foreign(&e),
+            e => self.refused(&e),
+        })?;
         result.metrics.peak_memory_mb = peak_memory_mb();
+        let mut outcome = Outcome::new(result.report.status, result.report.iterations)
+            .with_input(&self.input)
+            .with_metrics(&result.metrics)?;
+        outcome.summary = summary(&result, &options);
+        outcome.warnings.clone_from(&model.warnings);
+        outcome.warnings.extend(result.warnings.iter().map(ToString::to_string));
+        self.ending.apply(&mut outcome);
+        if !watch.finish(&mut outcome) {
+            return Ok(outcome);
+        }
         let splines = match self.output.output.iter().find(|path| is_spline_file(path)) {
             Some(path) => Some(
                 spline_patches(&result.result, &result.surface)
@@ -87,24 +105,15 @@ impl Fair {
             None => None,
         };
         if let Some(splines) = &splines {
-            result.metrics.add_splines(splines);
+            let before = result.warnings.len();
+            result.add_splines(splines);
+            outcome = outcome.with_metrics(&result.metrics)?;
+            outcome.warnings.extend(result.warnings[before..].iter().map(ToString::to_string));
+            outcome.summary.push(spline_summary(splines));
         }
-        let mut outcome = Outcome::new(result.report.status, result.report.iterations)
-            .with_input(&self.input)
-            .with_metrics(&result.metrics)?;
-        watch.finish(&mut outcome)?;
-        outcome.summary = summary(&result, &options);
-        outcome.warnings.clone_from(&model.warnings);
-        let fitted = splines.as_ref().and_then(|s| s.warning(&result.result));
-        let warnings = fitted.iter().chain(&result.warnings);
-        outcome.warnings.extend(warnings.map(ToString::to_string));
-        outcome.summary.extend(splines.as_ref().map(spline_summary));
-        outcome.require_converged = self.converged.require_converged;
         for path in self.output.output {
             let content = content_for(&path, &result, splines.as_ref(), &model.unit);
-            let bytes =
-                exchange::encode_model(&path, &content).map_err(|e| Failure::input(&path, e))?;
-            outcome.files.push((path, bytes));
+            outcome.add_model(path, &content)?;
         }
         if self.report.wanted() {
             let mut page = report_support::new("Fairing of a subdivision surface");
@@ -170,14 +179,8 @@ struct SymmetryFile {
 }
 
 fn read_control_mesh(path: &Path, model: &Model) -> Result<geom_core::PolyMesh, Failure> {
-    let mut meshes = model.meshes.iter().filter(|m| !m.faces.is_empty());
-    match (meshes.next(), meshes.next()) {
-        (Some(mesh), None) => mesh.to_poly_mesh().map_err(|e| Failure::input(path, e)),
-        (None, _) => Err(Failure::input(path, "there is no mesh in this file; give a quad mesh")),
-        (Some(_), Some(_)) => {
-            Err(Failure::input(path, "there are several meshes in this file; leave one of them in"))
-        }
-    }
+    let mesh = input_file::only_mesh(path, model)?;
+    mesh.to_poly_mesh().map_err(|e| Failure::input(path, e))
 }
 
 /// A further mesh of `--family`.
@@ -245,7 +248,7 @@ fn summary(result: &Solution, options: &Options) -> Vec<String> {
 
 /// Whether a file takes spline surfaces.
 fn is_spline_file(path: &Path) -> bool {
-    matches!(exchange::extension_of(path).as_str(), "step" | "stp" | "ron")
+    matches!(exchange::extension_of(path).as_str(), "step" | "stp" | "3dm" | "ron")
 }
 
 fn spline_summary(splines: &SplinePatches) -> String {
@@ -268,10 +271,10 @@ fn content_for(
 ) -> Model {
     let unit = unit.clone();
     if let Some(splines) = splines.filter(|_| is_spline_file(path)) {
-        let named = splines.surfaces.iter().map(|(face, surface)| NamedSurface {
-            name: format!("patch {}", face.0),
-            surface: surface.clone(),
-        });
+        let named = splines
+            .surfaces
+            .iter()
+            .map(|(face, surface)| NamedSurface::new(format!("patch {}", face.0), surface.clone()));
         return Model { unit, surfaces: named.collect(), ..Model::default() };
     }
     match exchange::extension_of(path).as_str() {

@@ -3,6 +3,7 @@
 use crate::args::{ConfigArgs, OutputArgs, ReportArgs};
 use crate::context::Context;
 use crate::failure::Failure;
+use crate::input_file::{self, PartArgs, SurfaceArgs};
 use crate::option_flags::OptionFlags;
 use crate::outcome::{Outcome, Status};
 use crate::report_support::{self, jets::spline_view};
@@ -11,7 +12,7 @@ use exchange::Model;
 use geom_core::{BoundingBox, DVec3, QuadGrid};
 use gp_solver::Counts;
 use serde::{Deserialize, Serialize};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// Arguments of `fit`.
 #[derive(Debug, clap::Args)]
@@ -19,6 +20,8 @@ use std::path::PathBuf;
 pub(crate) struct Fit {
     /// Quad mesh like a grid or a tube, or a RON scene with a point grid
     input: PathBuf,
+    #[command(flatten)]
+    part: PartArgs,
     #[command(flatten)]
     output: OutputArgs,
     #[command(flatten)]
@@ -38,7 +41,7 @@ gp_solver::options! {
         ctrl: Option<Counts> = None;
         /// Degree in both directions, 1 to 15; 4 if not given.
         degree: Option<usize> = None;
-        /// Largest distance of a point to the surface; 0.1 % of the diagonal if not given.
+        /// Largest distance of a point to the surface; 0.1 % of the size if not given.
         tolerance: Option<f64> = None;
     }
 }
@@ -57,9 +60,8 @@ impl Fit {
         self.report.check()?;
         let options = self.options.options(&self.config)?;
         let settings = settings(&options).map_err(|e| self.options.refused(&self.config, e))?;
-        let model =
-            exchange::read_model(&self.input).map_err(|e| Failure::input(&self.input, e))?;
-        let data = points(&model).map_err(|e| Failure::input(&self.input, e))?;
+        let model = input_file::read(context, &self.input, &SurfaceArgs::default(), &self.part)?;
+        let data = points(&self.input, &model)?;
         let fit = fit_grid(&data.points, data.n_u, data.n_v, data.closed_u, &settings)
             .map_err(|e| Failure::input(&self.input, e))?;
         let within = fit.distance_max <= fit.tolerance;
@@ -78,7 +80,7 @@ impl Fit {
                 data.n_v
             ),
             format!(
-                "  distance mean {:.3e}, rms {:.3e}, max {:.3e} {unit} ({:.4} % of the diagonal)",
+                "  distance mean {:.3e}, rms {:.3e}, max {:.3e} {unit} ({:.4} % of the size)",
                 fit.distance_mean, fit.distance_rms, fit.distance_max, metrics.distance_max_percent
             ),
         ];
@@ -100,9 +102,7 @@ impl Fit {
         let name = self.input.file_stem().map(|s| s.to_string_lossy().into_owned());
         let fitted = Model::of_surface(&name.unwrap_or_default(), fit.surface, model.unit);
         for path in self.output.output {
-            let bytes =
-                exchange::encode_model(&path, &fitted).map_err(|e| Failure::input(&path, e))?;
-            outcome.files.push((path, bytes));
+            outcome.add_model(path, &fitted)?;
         }
         Ok(outcome)
     }
@@ -120,20 +120,22 @@ fn settings(options: &Options) -> Result<GridFitOptions, String> {
     })
 }
 
-fn points(model: &Model) -> Result<Points, String> {
+fn points(path: &Path, model: &Model) -> Result<Points, Failure> {
+    let refused = |e: &dyn std::fmt::Display| Failure::input(path, e);
     if let Some(grid) = model.grids.first() {
         let (points, n_u, n_v) = (grid.points.clone(), grid.n_u, grid.n_v);
         if n_u < 2 || n_v < 2 {
-            return Err(format!("the grid has {n_u} x {n_v} points; a surface needs 2 x 2"));
+            let what = format!("the grid has {n_u} x {n_v} points; a surface needs 2 x 2");
+            return Err(refused(&what));
         }
         return Ok(Points { points, n_u, n_v, closed_u: false });
     }
-    let mesh = model.meshes.iter().find(|m| !m.faces.is_empty());
-    let Some(mesh) = mesh else {
-        return Err("the file has no faces and no point grid; give it one of them".to_owned());
-    };
-    let mesh = mesh.to_poly_mesh().map_err(|e| e.to_string())?;
-    let grid = QuadGrid::of(&mesh).map_err(|e| e.to_string())?;
+    if model.meshes.iter().all(|m| m.faces.is_empty()) {
+        return Err(refused(&"the file has no faces and no point grid; give it one of them"));
+    }
+    let mesh = input_file::only_mesh(path, model)?;
+    let mesh = mesh.to_poly_mesh().map_err(|e| refused(&e))?;
+    let grid = QuadGrid::of(&mesh).map_err(|e| refused(&e))?;
     let points = grid.vertices.iter().map(|v| mesh.position(*v)).collect();
     Ok(Points { points, n_u: grid.n_u, n_v: grid.n_v, closed_u: grid.closed_u })
 }
@@ -151,6 +153,8 @@ struct FitMetrics {
     distance_rms: f64,
     distance_max: f64,
     distance_max_percent: f64,
+    /// Of the diagonal of the box of the points, as releases before gave it.
+    distance_max_percent_box: f64,
 }
 
 impl FitMetrics {
@@ -167,7 +171,8 @@ impl FitMetrics {
             distance_mean: fit.distance_mean,
             distance_rms: fit.distance_rms,
             distance_max: fit.distance_max,
-            distance_max_percent: 100.0 * fit.distance_max / diagonal,
+            distance_max_percent: 100.0 * fit.distance_max / fit.size,
+            distance_max_percent_box: 100.0 * fit.distance_max / diagonal,
         }
     }
 }

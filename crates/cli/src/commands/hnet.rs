@@ -1,8 +1,10 @@
 //! `umbilic hnet QUADS -o OUT`.
 
-use crate::args::{CheckpointArgs, ConfigArgs, ConvergedArgs, OutputArgs, ReportArgs, SystemArgs};
+use crate::args::{ConfigArgs, EndingArgs, OutputArgs, ReportArgs, SystemArgs};
+use crate::checkpoints::CheckpointArgs;
 use crate::context::Context;
 use crate::failure::Failure;
+use crate::input_file::PartArgs;
 use crate::net_files::{self, NetInput};
 use crate::net_report;
 use crate::option_flags::{self, OptionFlags};
@@ -10,7 +12,8 @@ use crate::outcome::Outcome;
 use crate::report_support;
 use crate::watch::Watch;
 use geom_core::TriMesh;
-use hyperbolic_nets::{Input, Options, QuadNet, Solution, solve};
+use gp_solver::SolverError;
+use hyperbolic_nets::{Error, Input, Options, QuadNet, Solution, solve};
 use std::path::PathBuf;
 
 /// Arguments of `hnet`.
@@ -21,6 +24,8 @@ use std::path::PathBuf;
 pub(crate) struct Hnet {
     /// Quads that follow the asymptotic directions of a negatively curved surface, or a net file
     input: PathBuf,
+    #[command(flatten)]
+    part: PartArgs,
     #[command(flatten)]
     output: OutputArgs,
     /// Mesh of the surface to stay near [default: the input itself]
@@ -35,7 +40,7 @@ pub(crate) struct Hnet {
     #[command(flatten)]
     report: ReportArgs,
     #[command(flatten)]
-    converged: ConvergedArgs,
+    ending: EndingArgs,
     #[command(flatten)]
     system: SystemArgs,
 }
@@ -46,37 +51,45 @@ impl Hnet {
         net_files::check_outputs(&self.output.output, &net_files::NET_OUTPUTS)?;
         let options = self.options.options(&self.config)?;
         options.check().map_err(|e| self.options.refused(&self.config, e))?;
-        let refused = |e: hyperbolic_nets::Error| option_flags::refused::<Options>(&self.input, e);
-        let (input, unit, mut warnings) = net_files::read(&self.input)?;
+        let refused = |e: Error| option_flags::refused::<Options>(&self.input, e);
+        let mut watch = Watch::new(context, "net")
+            .of(&self.input)
+            .with_checkpoints(&self.checkpoint)?
+            .with_systems(self.system.dump_system.as_deref())?;
+        let (input, unit, mut warnings) = net_files::read(context, &self.input, &self.part)?;
         let net = match input {
             NetInput::Net(surface) => surface.net().clone(),
             NetInput::Mesh(mesh) => QuadNet::new(&mesh).map_err(refused)?,
         };
         let reference = match &self.reference {
             None => None,
-            Some(path) => Some(TriMesh::from_poly_mesh(&net_files::read_mesh(path)?.0)),
+            Some(path) => Some(TriMesh::from_poly_mesh(
+                &net_files::read_mesh(None, path, &PartArgs::default())?.0,
+            )),
         };
         let input = match &reference {
             None => Input::new(&net),
             Some(mesh) => Input::near_mesh(&net, mesh),
         };
-        let mut watch = Watch::new(context, "net")
-            .with_checkpoints(&self.checkpoint)?
-            .with_systems(self.system.dump_system.as_deref())?;
-        let solution = solve(&input, &options, &mut watch).map_err(refused)?;
+        let solution = solve(&input, &options, &mut watch).map_err(|e| match e {
+            Error::Solver(e @ SolverError::ForeignCheckpoint { .. }) => watch.foreign(&e),
+            e => refused(e),
+        })?;
         warnings.extend(solution.warnings.iter().map(ToString::to_string));
         let Solution { result: surface, metrics, report, .. } = &solution;
         let mut outcome = Outcome::new(report.status, report.iterations)
             .with_input(&self.input)
             .with_metrics(metrics)?;
-        watch.finish(&mut outcome)?;
+        outcome.summary = summary(&solution);
+        outcome.warnings = warnings;
+        self.ending.apply(&mut outcome);
+        if !watch.finish(&mut outcome) {
+            return Ok(outcome);
+        }
         for path in self.output.output {
             let bytes = net_files::encode(&path, surface, &unit, options.wire_positions)?;
             outcome.files.push((path, bytes));
         }
-        outcome.summary = summary(&solution);
-        outcome.warnings = warnings;
-        outcome.require_converged = self.converged.require_converged;
         if self.report.wanted() {
             let mut page = net_report::page("Hyperbolic net", &self.input, &unit);
             option_flags::list(&mut page, &options, &[]);

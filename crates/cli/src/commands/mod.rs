@@ -6,6 +6,7 @@
 //! files as bytes: `main` writes them together with the metrics and prints the summary.
 
 mod analyze;
+mod analyze_list;
 mod asymptotic;
 mod convert;
 mod darboux;

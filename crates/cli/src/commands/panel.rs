@@ -1,17 +1,19 @@
 //! `umbilic panel SURFACE -o OUT`.
 
-use crate::args::{CheckpointArgs, ConfigArgs, ConvergedArgs, ReportArgs, check_output_path};
+use crate::args::{ConfigArgs, EndingArgs, ReportArgs, check_output_path};
+use crate::checkpoints::CheckpointArgs;
 use crate::context::Context;
 use crate::failure::Failure;
+use crate::input_file::{SurfaceArgs, read_surface};
 use crate::option_flags::{OptionFlags, list, refused};
 use crate::outcome::{Outcome, Status};
 use crate::panel_files::{PANEL_OUTPUTS, encode};
 use crate::report_support;
 use crate::report_support::panels::paneling_report;
-use crate::surface_file::read_surface;
 use crate::watch::Watch;
 use bspline::BsplineSurface;
 use exchange::LengthUnit;
+use gp_solver::SolverError;
 use paneling::{Error, Input, Layout, MoldType, Options, Paneling, PriceList, Solution, solve};
 use std::path::{Path, PathBuf};
 
@@ -21,10 +23,13 @@ use std::path::{Path, PathBuf};
     after_help = "Example: umbilic panel fixtures/roof.ron --panels 30x30 --k 3 -o panels.glb -o panels.csv -o molds.step"
 )]
 pub(crate) struct Panel {
-    /// File with one B-spline surface
-    surface: PathBuf,
-    /// Where to write (repeatable): panels as glb or obj, their table as csv or ron, molds as step,
-    /// flat outlines of panels on planar and cylindrical molds as svg or dxf
+    /// File with a B-spline surface
+    input: PathBuf,
+    #[command(flatten)]
+    surface: SurfaceArgs,
+    /// Where to write (repeatable): panels as glb or obj, molds as step, both as 3dm with a layer
+    /// per mold, a table of the panels as csv or ron, flat outlines of panels on planar and
+    /// cylindrical molds as svg or dxf
     #[arg(short, long = "output", value_name = "FILE", required = true)]
     output: Vec<PathBuf>,
     #[command(flatten)]
@@ -37,7 +42,7 @@ pub(crate) struct Panel {
     #[command(flatten)]
     checkpoint: CheckpointArgs,
     #[command(flatten)]
-    converged: ConvergedArgs,
+    ending: EndingArgs,
     #[command(flatten)]
     report: ReportArgs,
 }
@@ -76,7 +81,9 @@ impl Panel {
         self.report.check()?;
         let options = self.options.options(&self.config)?;
         options.check().map_err(|e| self.options.refused(&self.config, e))?;
-        let (model, named) = read_surface(&self.surface)?;
+        let mut watch =
+            Watch::new(context, "panelling").of(&self.input).with_checkpoints(&self.checkpoint)?;
+        let (model, named) = read_surface(context, &self.input, &self.surface)?;
         let unit = model.unit;
         let layout = layout(self.options.file("layout"), &options, &named.surface)?;
         let prices = match &self.prices {
@@ -87,22 +94,23 @@ impl Panel {
         if let Some(layout) = &layout {
             input = input.with_layout(layout);
         }
-        let mut watch = Watch::new(context, "panelling").with_checkpoints(&self.checkpoint)?;
-        let solution = solve(input, &options, &mut watch).map_err(|e| {
-            let file = match (&e, &self.prices) {
-                (Error::NoPrice { .. } | Error::BadPrice { .. }, Some(prices)) => prices,
-                _ => &self.surface,
-            };
-            refused::<Options>(file, e)
+        let solution = solve(input, &options, &mut watch).map_err(|e| match (e, &self.prices) {
+            (Error::Solver(e @ SolverError::ForeignCheckpoint { .. }), _) => watch.foreign(&e),
+            (e @ (Error::NoPrice { .. } | Error::BadPrice { .. }), Some(prices)) => {
+                refused::<Options>(prices, e)
+            }
+            (e, _) => refused::<Options>(&self.input, e),
         })?;
         let (paneling, set) = (&solution.result, &solution.panels);
         let mut outcome = Outcome::new(solution.report.status, paneling.iterations())
-            .with_input(&self.surface)
+            .with_input(&self.input)
             .with_metrics(&solution.metrics)?;
-        watch.finish(&mut outcome)?;
         outcome.warnings = model.warnings;
-        outcome.require_converged = self.converged.require_converged;
+        self.ending.apply(&mut outcome);
         outcome.summary = summary(&solution, &unit);
+        if !watch.finish(&mut outcome) {
+            return Ok(outcome);
+        }
         for path in self.output {
             let sheet = options.sheet.map(|s| [s.width, s.height]);
             let files = encode(&path, set, paneling, &unit, sheet)?;
@@ -135,7 +143,7 @@ impl Panel {
             if !PANEL_OUTPUTS.contains(&extension.as_str()) {
                 return Err(Failure::input(
                     path,
-                    "panels are written as glb or obj, their table as csv or ron, molds as step, flat outlines as svg or dxf",
+                    "panels are written as glb or obj, their table as csv or ron, molds as step, both as 3dm, flat outlines as svg or dxf",
                 ));
             }
             check_output_path(path)?;
@@ -170,7 +178,7 @@ fn summary(solution: &Solution, unit: &LengthUnit) -> Vec<String> {
             "  gaps: median {:.3e}, 95 % below {:.3e}, largest {:.3e} {unit}",
             quality.gap_median, quality.gap_p95, quality.gap_max
         ),
-        format!("  design met within {:.5} % of the diagonal", quality.deviation_max_percent),
+        format!("  design met within {:.5} % of the size", quality.deviation_max_percent),
     ];
     let counts = MoldType::ALL.map(|t| (t, paneling.molds.iter().filter(|m| m.kind == t).count()));
     let used: Vec<String> = counts

@@ -1,19 +1,21 @@
 //! `umbilic weingarten SURFACE -o OUT`.
 
-use crate::args::{CheckpointArgs, ConfigArgs, ConvergedArgs, OutputArgs, ReportArgs, SystemArgs};
+use crate::args::{ConfigArgs, EndingArgs, OutputArgs, ReportArgs, SystemArgs};
+use crate::checkpoints::CheckpointArgs;
 use crate::context::Context;
 use crate::failure::Failure;
+use crate::input_file::{SurfaceArgs, read_other_surface, read_surface};
 use crate::option_flags::{OptionFlags, refused};
-use crate::outcome::Outcome;
+use crate::outcome::{Outcome, Status};
 use crate::report_support;
 use crate::report_support::weingarten::weingarten_report;
-use crate::surface_file::read_surface;
 use crate::watch::Watch;
-use exchange::{LengthUnit, Model};
-use gp_solver::OptionValue;
+use bspline::{Flaw, FlawKind};
+use exchange::{LengthUnit, Model, NamedSurface};
+use gp_solver::{OptionValue, SolverError};
 use serde::Serialize;
 use std::path::PathBuf;
-use weingarten::{Metrics, Options, RelationLocus, Solution, solve};
+use weingarten::{Error, Input, Metrics, Options, RelationLocus, Solution, solve};
 
 /// Arguments of `weingarten`.
 #[derive(Debug, clap::Args)]
@@ -24,8 +26,10 @@ Examples:
       --levels 10x8,14x10,18x14,25x18 --metrics roof.json
 A relation `curve` takes its control points from a file too: --relation curve=FILE.ron.")]
 pub(crate) struct Weingarten {
-    /// File with one B-spline surface (RON, STEP)
+    /// File with a B-spline surface (RON, STEP, 3DM)
     input: PathBuf,
+    #[command(flatten)]
+    surface: SurfaceArgs,
     #[command(flatten)]
     output: OutputArgs,
     #[command(flatten)]
@@ -34,8 +38,11 @@ pub(crate) struct Weingarten {
     config: ConfigArgs,
     #[command(flatten)]
     checkpoint: CheckpointArgs,
+    /// Begin at this result of before: same terms and reference, fresh damping
+    #[arg(long, value_name = "RESULT")]
+    start: Option<PathBuf>,
     #[command(flatten)]
-    converged: ConvergedArgs,
+    ending: EndingArgs,
     #[command(flatten)]
     report: ReportArgs,
     #[command(flatten)]
@@ -48,28 +55,42 @@ impl Weingarten {
         self.report.check()?;
         let options = self.options.options(&self.config)?;
         options.check().map_err(|e| self.options.refused(&self.config, e))?;
-        let (model, named) = read_surface(&self.input)?;
         let mut watch = Watch::new(context, "optimising")
+            .of(&self.input)
             .with_checkpoints(&self.checkpoint)?
             .with_systems(self.system.dump_system.as_deref())?;
-        let solution = solve(&named.surface, &options, &mut watch)
-            .map_err(|e| refused::<Options>(&self.input, e))?;
+        let (model, named) = read_surface(context, &self.input, &self.surface)?;
+        let start = self.start.as_deref().map(read_other_surface).transpose()?;
+        let mut input = Input::within(&named.surface, named.trim.as_ref());
+        if let Some(start) = &start {
+            input = input.starting_from(start);
+        }
+        let solution = solve(input, &options, &mut watch).map_err(|e| match e {
+            Error::Solver(e @ SolverError::ForeignCheckpoint { .. }) => watch.foreign(&e),
+            e @ Error::OtherDomain => {
+                refused::<Options>(self.start.as_deref().unwrap_or(&self.input), e)
+            }
+            e => refused::<Options>(&self.input, e),
+        })?;
         let mut outcome = outcome(&solution, &options, &model.unit)?.with_input(&self.input);
-        watch.finish(&mut outcome)?;
-        outcome.warnings = model.warnings;
-        outcome.require_converged = self.converged.require_converged;
+        outcome.warnings.extend(model.warnings);
+        self.ending.apply(&mut outcome);
+        if !watch.finish(&mut outcome) {
+            return Ok(outcome);
+        }
         let report = match self.report.wanted() {
             true => {
                 let unit = model.unit.to_string();
-                Some(weingarten_report(&named.surface, &solution, &options, &unit)?)
+                Some(weingarten_report(&named, &solution, &options, &unit)?)
             }
             false => None,
         };
-        let result = Model::of_surface(&named.name, solution.result, model.unit);
+        // The trim bounds the same parameters; its curves in space follow the surface.
+        let trim = named.trim.map(|trim| trim.without_edges());
+        let result = NamedSurface { surface: solution.result, trim, ..named };
+        let result = Model { unit: model.unit, surfaces: vec![result], ..Model::default() };
         for path in self.output.output {
-            let bytes =
-                exchange::encode_model(&path, &result).map_err(|e| Failure::input(&path, e))?;
-            outcome.files.push((path, bytes));
+            outcome.add_model(path, &result)?;
         }
         if let Some(report) = report {
             report_support::add_files(&mut outcome, &self.report, context, report)?;
@@ -96,10 +117,13 @@ pub(crate) fn outcome(
         working_scale: solution.working_scale,
         relation_scale: solution.relation_scale,
         relation_line: solution.relation.as_ref().and_then(line),
+        flaws: solution.flaws.len(),
+        flaws_at: solution.flaws.iter().map(|f| (f.kind.as_str(), f.u, f.v)).collect(),
         ms_per_iteration: report.ms_per_iteration(),
         factorizations: report.factorizations(),
     })?;
     outcome.summary = summary(solution, unit);
+    outcome.warnings.extend(flaw_warning(&solution.flaws));
     Ok(outcome)
 }
 
@@ -124,6 +148,10 @@ struct Numbers<'a> {
     /// `a H + b K + c = 0` in units of the model, where the relation is a line.
     #[serde(skip_serializing_if = "Option::is_none")]
     relation_line: Option<Line>,
+    /// Check points where the result folds, has a spike or is not finite, and where.
+    flaws: usize,
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    flaws_at: Vec<(&'static str, f64, f64)>,
     ms_per_iteration: f64,
     factorizations: usize,
 }
@@ -142,6 +170,34 @@ fn line(locus: &RelationLocus) -> Option<Line> {
     }
 }
 
+/// How the run ended, in words. Steps that were asked for and made are no cause for alarm.
+fn ending(solution: &Solution) -> String {
+    let (after, status) = (&solution.metrics, solution.report.status);
+    match (&solution.earlier, status) {
+        (Some((steps, earlier)), Status::IterationLimit) if earlier.diagram_area > 0.0 => {
+            let change = 100.0 * (after.diagram_area / earlier.diagram_area - 1.0);
+            format!("as asked for; the last {steps} changed the diagram by {change:.1} %")
+        }
+        _ => status.as_str().replace('_', " "),
+    }
+}
+
+/// What is wrong with the result, and what to do about it.
+fn flaw_warning(flaws: &[Flaw]) -> Option<String> {
+    let first = flaws.first()?;
+    let what = match first.kind {
+        FlawKind::Fold => "folds back on itself",
+        FlawKind::NotFinite => "is not finite",
+        _ => "has a spike or a tear",
+    };
+    Some(format!(
+        "the result {what} between its samples, first at u = {:.6}, v = {:.6} ({} places in all); ask for more samples, a larger fairness or closeness, or fewer steps, or look at it with --keep-failed",
+        first.u,
+        first.v,
+        flaws.len()
+    ))
+}
+
 fn summary(solution: &Solution, unit: &LengthUnit) -> Vec<String> {
     let Solution { result: surface, before, metrics: after, report, .. } = solution;
     let mut lines = vec![format!(
@@ -149,7 +205,7 @@ fn summary(solution: &Solution, unit: &LengthUnit) -> Vec<String> {
         surface.n_u(),
         surface.n_v(),
         report.iterations,
-        report.status.as_str().replace('_', " "),
+        ending(solution),
     )];
     lines.push(format!(
         "  curvature diagram    {:.6} of its box (before {:.6})",
@@ -166,7 +222,7 @@ fn summary(solution: &Solution, unit: &LengthUnit) -> Vec<String> {
         ));
     }
     lines.push(format!(
-        "  deviation            mean {:.4} %, max {:.4} %, border {:.4} % of the diagonal",
+        "  deviation            mean {:.4} %, max {:.4} %, border {:.4} % of the size",
         after.deviation_mean_percent,
         after.deviation_max_percent,
         after.boundary_deviation_max_percent

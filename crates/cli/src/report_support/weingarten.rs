@@ -3,23 +3,33 @@
 use super::energies::energy_history;
 use super::jets::spline_view;
 use crate::failure::Failure;
-use bspline::BsplineSurface;
+use crate::report_support::mesh::mesh_view;
+use exchange::{NamedSurface, face_mesh};
 use gp_solver::Counts;
 use report::{RelationCurve, Report};
 use weingarten::{Metrics, Options, Relation, RelationLocus, Solution};
 
 /// The surface before and after with its deviation, the energies, and the options in force.
 pub(crate) fn weingarten_report(
-    input: &BsplineSurface,
+    named: &NamedSurface,
     solution: &Solution,
     options: &Options,
     length_unit: &str,
 ) -> Result<Report, Failure> {
     let mut report = super::new("Weingarten optimisation");
     report.length_unit = length_unit.to_owned();
-    report.stages.push(spline_view("before", &[input], None, length_unit)?);
-    let after = spline_view("after", &[&solution.result], Some(&[input]), length_unit)?;
-    report.stages.push(after);
+    let input = &named.surface;
+    if let Some(trim) = &named.trim {
+        let trim = Some(trim.without_edges());
+        let after = NamedSurface { surface: solution.result.clone(), trim, ..named.clone() };
+        for (name, face) in [("before", named), ("after", &after)] {
+            report.stages.push(mesh_view(name, &face_mesh(face, None), length_unit)?);
+        }
+    } else {
+        report.stages.push(spline_view("before", &[input], None, length_unit)?);
+        let after = spline_view("after", &[&solution.result], Some(&[input]), length_unit)?;
+        report.stages.push(after);
+    }
     let levels = solution.report.stages.iter().map(|l| (l.stage.name.clone(), &l.solver));
     report.energies = Some(energy_history(levels));
     report

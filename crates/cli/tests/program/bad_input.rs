@@ -100,7 +100,7 @@ fn faulty_surfaces() {
         // No area, and a pole.
         (
             scene("2", [one, one, one], ""),
-            "all control points coincide, so the surface has no extent; check the coordinates",
+            "all points of the model are equal (1, 1, 1), so it has no shape",
         ),
         (
             scene(

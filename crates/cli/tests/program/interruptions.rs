@@ -1,6 +1,13 @@
 //! What is on the disk after an interruption, a kill and a full disk: never half a file.
 
-use crate::common::{UMBILIC, message, root, umbilic};
+use crate::common::{
+    UMBILIC, copy, examples, message, root, stopped, stops_within_a_second, umbilic,
+};
+use bspline::BsplineSurface;
+use exchange::{LengthUnit, Mesh, Model};
+use fixtures::random::Random;
+use fixtures::{quad_graphs, surfaces::Shape};
+use geom_core::{DVec3, PolyMesh};
 use std::fs;
 use std::io::{BufRead, BufReader, Read};
 use std::path::Path;
@@ -92,6 +99,114 @@ fn ctrl_c_ends_a_command_that_has_no_state_to_keep() {
     assert_eq!(child.wait().expect("it ends").code(), Some(130));
     assert!(signal.elapsed() < Duration::from_secs(20));
     assert!(names(folder.path()).is_empty());
+}
+
+/// A model in a file.
+fn write(path: &Path, model: &Model) {
+    fs::write(path, exchange::encode_model(path, model).expect("a format")).expect("written");
+}
+
+/// Quads between the control points.
+fn net_of(surface: &BsplineSurface) -> PolyMesh {
+    let (n, m) = (surface.n_u() as u32, surface.n_v() as u32);
+    let quads: Vec<[u32; 4]> = (0..(n - 1) * (m - 1))
+        .map(|k| k / (m - 1) * m + k % (m - 1))
+        .map(|a| [a, a + m, a + m + 1, a + 1])
+        .collect();
+    PolyMesh::new(surface.control_points().to_vec(), &quads).expect("a grid")
+}
+
+#[test]
+fn ctrl_c_at_any_moment_ends_every_command_within_a_second() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let at = |name: &str| folder.path().join(name);
+    copy(&root().join("fixtures"), &at("fixtures"));
+    let surface = Shape::Roof.surface(90, 90, 4, 4);
+    let unit = LengthUnit::default;
+    write(&at("grid.obj"), &Model::of_mesh(Mesh::from_poly_mesh(&net_of(&surface)), unit()));
+    write(&at("surface.ron"), &Model::of_surface("roof", surface, unit()));
+    let ellipsoid = quad_graphs::ellipsoid(18, DVec3::new(1.0, 1.3, 1.7));
+    write(&at("quads.obj"), &Model::of_mesh(Mesh::from_poly_mesh(&ellipsoid), unit()));
+    // Larger than the examples, which other commands are run with.
+    let large = |command: &str| match command {
+        "analyze" => vec!["surface.ron --report page.html", "quads.obj"],
+        "asymptotic" => vec!["fixtures/asymptotic/catenoid-net-30.obj --from-net -o out.step"],
+        "convert" => vec!["surface.ron out.step"],
+        "darboux" => vec!["fixtures/nets/catenoid-ring.obj --c -0.6 -o out.glb"],
+        "fair" => vec!["quads.obj -o out.step --levels 0 --iterations 3"],
+        "fit" => vec!["grid.obj --ctrl 60x60 -o out.step --report page.html"],
+        "hnet" => vec!["fixtures/nets/catenoid-ring.obj -o out.step -o out.glb --report page.html"],
+        "panel" => vec![
+            "surface.ron --panels 30x30 -o out.glb --report page.html",
+            "fixtures/roof-optimised.ron --panels 16x16 --max-kink-deg 1 -o out.csv",
+        ],
+        "weingarten" => vec!["surface.ron --iterations 1 -o out.step"],
+        _ => vec![],
+    };
+    let before: Vec<String> = names(folder.path());
+    let mut random = Random::new(1);
+    for command in cli::command().get_subcommands().map(|c| c.get_name().to_owned()) {
+        let help = String::from_utf8(umbilic(&[&command, "--help"]).stdout).expect("text");
+        let lines: Vec<String> = match large(&command)[..] {
+            [] => examples(&help).into_iter().take(1).collect(),
+            ref more => more.iter().map(|line| format!("umbilic {command} {line}")).collect(),
+        };
+        for line in lines {
+            let line = line.replacen("umbilic", "exec \"$0\"", 1);
+            let run = || {
+                let mut shell = Command::new("sh");
+                shell.args(["-c", &format!("{line} --metrics metrics.json"), UMBILIC]);
+                shell.current_dir(folder.path());
+                shell
+            };
+            let clear = || {
+                for name in names(folder.path()).iter().filter(|name| !before.contains(name)) {
+                    let path = at(name);
+                    let is_folder = path.is_dir();
+                    let gone =
+                        if is_folder { fs::remove_dir_all(path) } else { fs::remove_file(path) };
+                    gone.expect("removed");
+                }
+            };
+            let begin = Instant::now();
+            let whole = run().output().expect("it runs");
+            let time = begin.elapsed();
+            assert!(whole.status.success(), "{line}: {}", message(&whole));
+            clear();
+            let mut ended = Vec::new();
+            for moment in 0..5 {
+                let after = time.mul_f64((f64::from(moment) + random.uniform()) / 5.0);
+                let what = format!("{line} after {after:?} of {time:?}");
+                let end = stops_within_a_second(&what, &|| {
+                    clear();
+                    stopped(&mut run(), after)
+                });
+                if end.is_interrupted() {
+                    ended.push(end.took);
+                } else {
+                    assert!(end.status.success(), "{what}: {}", end.said);
+                }
+            }
+            println!("{line}: {time:?}, stopped after {ended:?}");
+            assert!(!ended.is_empty(), "{line}: no signal came in time");
+            // Nothing is written but what tells of the interruption.
+            clear();
+            let after = time.mul_f64(0.3);
+            if stopped(&mut run(), after).status.code() == Some(130) {
+                let found = names(folder.path());
+                let new: Vec<&String> = found.iter().filter(|n| !before.contains(n)).collect();
+                // The demo makes its folder first.
+                let expected = ["metrics.json", "umbilic-demo"];
+                assert!(new.iter().all(|n| expected.contains(&n.as_str())), "{line}: {new:?}");
+                let text = fs::read_to_string(at("metrics.json")).expect("written");
+                let json: serde_json::Value = serde_json::from_str(&text).expect("JSON");
+                assert_eq!(json["status"], "interrupted", "{line}");
+                assert_eq!(json["command"], command.as_str());
+                assert_eq!(json["outputs"], serde_json::json!([]));
+            }
+            clear();
+        }
+    }
 }
 
 #[test]

@@ -10,11 +10,22 @@ mod dist;
 mod dist_example;
 mod every_command;
 mod fair;
+mod careful_files;
 mod files;
 mod hyperbolic;
 #[cfg(unix)]
 mod interruptions;
+mod invariance;
 mod panel;
 mod report;
+#[cfg(unix)]
+mod resume;
+mod snapshots;
 mod verify;
 mod weingarten;
+
+#[cfg(not(unix))]
+#[test]
+fn interruptions() {
+    eprintln!("SKIPPED interruptions and resume: this platform has no signal for Ctrl-C");
+}

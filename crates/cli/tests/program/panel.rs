@@ -70,7 +70,7 @@ fn a_file_without_a_surface_is_refused() {
     let output = panel("fixtures/grid.obj", &["-o", &out]);
     let message = String::from_utf8(output.stderr).unwrap();
     assert_eq!(output.status.code(), Some(2));
-    assert!(message.contains("fixtures/grid.obj: there is no B-spline surface"), "{message}");
+    assert!(message.contains("fixtures/grid.obj: there is no surface in this file"), "{message}");
 }
 
 #[test]

@@ -155,7 +155,10 @@ fn bad_surfaces_are_refused_with_the_file_and_the_mend() {
             scene("nan.ron", "1", "[(0, 0, NaN), (0, 1, 0)], [(1, 0, 0), (1, 1, 1)]"),
             vec!["nan.ron"],
         ),
-        (scene("point.ron", "1", "[(1, 1, 1), (1, 1, 1)], [(1, 1, 1), (1, 1, 1)]"), vec!["extent"]),
+        (
+            scene("point.ron", "1", "[(1, 1, 1), (1, 1, 1)], [(1, 1, 1), (1, 1, 1)]"),
+            vec!["no shape"],
+        ),
         (scene("pole.ron", "1", "[(0, 0, 0), (0, 0, 0)], [(1, 0, 0), (1, 1, 1)]"), vec!["pinched"]),
         (scene("line.ron", "1", "[(0, 0, 0), (1, 0, 0)], [(2, 0, 0), (3, 0, 0)]"), vec!["pinched"]),
     ];

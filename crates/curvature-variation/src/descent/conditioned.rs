@@ -7,9 +7,24 @@ use crate::functional::ROOT_EPSILON;
 use crate::limits::LinearRow;
 use crate::metric::MetricAssembly;
 use gp_solver::{Metric, Observer, SolverError, Status};
+use numerics::dot;
 
 /// How often a matrix that is not positive definite is given more of the Sobolev norm.
 const MENDINGS: usize = 12;
+
+/// Weight of the Sobolev norm where nothing is to be steered, only judged.
+const CERTIFYING: f64 = 1e-6;
+/// Parts of the step that are tried.
+const SHARES: [f64; 4] = [1.0, 0.3, 0.1, 0.03];
+
+/// What is left to gain, and where.
+pub(crate) struct Left {
+    /// The energy now.
+    pub(crate) before: f64,
+    pub(crate) gain: f64,
+    /// The unknowns that bring it.
+    pub(crate) y: Vec<f64>,
+}
 
 /// What a step stands on.
 pub(crate) struct Conditioned<'a> {
@@ -103,6 +118,56 @@ impl<'a> Conditioned<'a> {
             }
         }
         Ok(Ok(0))
+    }
+
+    /// What is left to gain from `y`: what a Gauss-Newton step with hardly any damping foresees,
+    /// `½ gᵀM⁻¹g` with the gradient on the conditions, or what a part of that step really brings,
+    /// whichever is less (where the matrix is all but singular it foresees anything). None if it was
+    /// stopped, or without a matrix.
+    pub(crate) fn left(
+        &mut self,
+        y: &[f64],
+        observer: &mut dyn Observer,
+    ) -> Result<Option<Left>, SolverError> {
+        if self.steering.metric.is_none() {
+            return Ok(None);
+        }
+        self.energy.refresh(y);
+        let mut gradient = vec![0.0; y.len()];
+        let before = self.energy.value(y, &mut gradient);
+        let rows = self.condition_rows(y);
+        self.keep(Vec::new(), false);
+        if self.factor(y, true, CERTIFYING, observer)?.is_err() {
+            return Ok(None);
+        }
+        self.energy.refresh(y);
+        self.keep(rows, true);
+        let mut step = gradient.clone();
+        self.steering.apply_inverse(&mut step);
+        let foreseen = 0.5 * dot(&gradient, &step);
+        let mut left = Left { before, gain: 0.0, y: y.to_vec() };
+        let mut unused = vec![0.0; y.len()];
+        for share in SHARES {
+            let trial: Vec<f64> = y.iter().zip(&step).map(|(y, s)| y - share * s).collect();
+            let gain = before - self.energy.value(&trial, &mut unused);
+            // A step that leads where the energy is no number brings nothing.
+            if gain > left.gain {
+                (left.gain, left.y) = (gain, trial);
+            }
+        }
+        left.gain = left.gain.min(foreseen);
+        Ok(Some(left))
+    }
+
+    /// Gives the level a matrix where its method needs none.
+    pub(crate) fn with_metric(
+        &mut self,
+        make: impl FnOnce(&LevelEnergy<'a>) -> Result<MetricAssembly, SolverError>,
+    ) -> Result<(), SolverError> {
+        if self.steering.metric.is_none() {
+            self.steering.metric = Some(make(&self.energy)?);
+        }
+        Ok(())
     }
 
     /// Meets the linear conditions at the start.

@@ -3,7 +3,7 @@
 use std::cell::RefCell;
 use std::time::Instant;
 
-use super::conditioned::Conditioned;
+use super::conditioned::{Conditioned, Left};
 use super::newton::{GainRatio, NewtonModel, Shared};
 use super::rounds::{DAMPING, Descent, round_options};
 use crate::options::Method;
@@ -114,6 +114,19 @@ impl State {
         this.report.factorizations = factorizations as usize;
         this.report.gradient_norm = gradient_norm_of(checkpoint, "gradient_norm");
         Ok(Some(this))
+    }
+
+    /// Goes on from where a certificate has found something left to gain, which counts as a step.
+    pub(crate) fn go_on(&mut self, left: Left, plan: &Plan) {
+        let energy = left.before - left.gain;
+        let record = IterationRecord { energy, decrease: left.gain, ..blank() };
+        self.record(left.before, record);
+        self.y = left.y;
+        self.report.iterations += 1;
+        self.report.factorizations += 1;
+        self.report.status = Status::IterationLimit;
+        let is_all = plan.method == Method::GaussNewton;
+        self.phase = if is_all { Phase::Newton } else { Phase::Rounds };
     }
 
     /// Takes up a step in the report.

@@ -1,5 +1,7 @@
 //! Binary glTF 2.0.
 
+mod accessor;
+mod prescan;
 mod read;
 mod write;
 

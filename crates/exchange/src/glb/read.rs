@@ -1,5 +1,7 @@
-//! Reading triangles.
+//! Reading triangles and lines.
 
+use super::accessor::Numbers;
+use super::prescan::check_objects;
 use crate::error::ReadError;
 use crate::json::{check_depth, fault};
 use crate::mesh::{Field, Group, Mesh};
@@ -8,6 +10,11 @@ use crate::ron_text::MAX_DEPTH;
 use crate::unit::LengthUnit;
 use geom_core::DVec3;
 use glam::{DMat4, DQuat};
+use gltf::json::Root;
+use gltf::json::validation::Checked::Valid;
+use gltf::json::validation::{Error as Fault, Validate};
+use gltf::mesh::Mode;
+use gltf::{Document, Semantic};
 use serde::Deserialize;
 use std::collections::BTreeMap;
 
@@ -15,124 +22,91 @@ use std::collections::BTreeMap;
 const MOST_JSON: usize = 4 << 20;
 /// Vertices and corners of all meshes may take this many bytes, and eight times the file.
 const MOST_BYTES: usize = 32 << 20;
+/// Bytes of a vertex with its normal and colour.
+const PER_VERTEX: usize = 24 + 24 + 12;
+/// Bytes of a corner of a triangle, with its share of what else a face takes.
+const PER_CORNER: usize = 8;
 
+const MEND: &str = "export the scene again";
+
+/// Placements in double precision, which the library has in single precision.
 #[derive(Default, Deserialize)]
-#[serde(default, rename_all = "camelCase")]
-struct Document {
-    scene: usize,
-    scenes: Vec<Scene>,
-    nodes: Vec<Node>,
-    meshes: Vec<MeshText>,
-    materials: Vec<Named>,
-    accessors: Vec<Accessor>,
-    buffer_views: Vec<View>,
-    extensions_required: Vec<String>,
+#[serde(default)]
+struct Placements {
+    nodes: Vec<Placement>,
 }
 
 #[derive(Default, Deserialize)]
 #[serde(default)]
-struct Scene {
-    nodes: Vec<usize>,
-}
-
-#[derive(Default, Deserialize)]
-#[serde(default)]
-struct Named {
-    name: String,
-}
-
-#[derive(Default, Deserialize)]
-#[serde(default)]
-struct Node {
-    name: String,
-    mesh: Option<usize>,
-    children: Vec<usize>,
+struct Placement {
     matrix: Option<Box<[f64; 16]>>,
     translation: Option<[f64; 3]>,
     rotation: Option<[f64; 4]>,
     scale: Option<[f64; 3]>,
 }
 
-#[derive(Default, Deserialize)]
-#[serde(default)]
-struct MeshText {
-    primitives: Vec<Primitive>,
+impl Placement {
+    fn matrix(&self) -> DMat4 {
+        if let Some(matrix) = &self.matrix {
+            return DMat4::from_cols_array(matrix);
+        }
+        let rotation = self.rotation.map_or(DQuat::IDENTITY, DQuat::from_array);
+        DMat4::from_scale_rotation_translation(
+            self.scale.map_or(DVec3::ONE, DVec3::from),
+            // Written in single precision, a turn is not quite of unit length.
+            if rotation.length() > 0.0 { rotation.normalize() } else { rotation },
+            self.translation.map_or(DVec3::ZERO, DVec3::from),
+        )
+    }
 }
 
-#[derive(Deserialize)]
-struct Primitive {
-    attributes: BTreeMap<String, usize>,
-    indices: Option<usize>,
-    material: Option<usize>,
-    #[serde(default = "triangles")]
-    mode: u32,
-}
-
-const LINES: u32 = 1;
-const TRIANGLES: u32 = 4;
-const STRIP: u32 = 5;
-const FAN: u32 = 6;
-
-fn triangles() -> u32 {
-    TRIANGLES
-}
-
-#[derive(Deserialize)]
-#[serde(rename_all = "camelCase")]
-struct Accessor {
-    buffer_view: Option<usize>,
-    #[serde(default)]
-    byte_offset: usize,
-    component_type: u32,
-    count: usize,
-    #[serde(rename = "type")]
-    kind: String,
-    #[serde(default)]
-    sparse: Option<serde::de::IgnoredAny>,
-}
-
-#[derive(Deserialize)]
-#[serde(rename_all = "camelCase")]
-struct View {
-    #[serde(default)]
-    buffer: usize,
-    #[serde(default)]
-    byte_offset: usize,
-    byte_length: usize,
-    byte_stride: Option<usize>,
-}
-
-/// Reads the triangles of the default scene of a GLB file, with y up turned to z up, in metres.
-/// Scalar attributes `_NAME` become fields, materials become groups of faces.
+/// Reads the triangles and lines of the default scene of a GLB file, with y up turned to z up, in
+/// metres. Scalar attributes `_NAME` become fields, materials become groups of faces.
 ///
 /// # Errors
-/// [`ReadError`] names the byte, or the part of the scene at fault.
+/// [`ReadError`] names the byte, or the part of the scene at fault; scenes that place their meshes
+/// so often that they outgrow 32 MiB and eight times the file are refused before they are built.
 pub fn read_glb(bytes: &[u8]) -> Result<Model, ReadError> {
     let (text, binary) = chunks(bytes)?;
     check_depth(text)?;
-    let document: Document = serde_json::from_str(text).map_err(|e| fault(&e))?;
-    if let Some(extension) = document.extensions_required.first() {
+    check_objects(text, bytes.len())?;
+    let root: Root = serde_json::from_str(text).map_err(|e| fault(&e))?;
+    let placements: Placements = serde_json::from_str(text).map_err(|e| fault(&e))?;
+    if let Some(extension) = root.extensions_required.first() {
         let what = format!("the file needs the extension {}", crate::error::clip(extension));
         return Err(ReadError::content(what, "export it without compression"));
     }
-    let budget = MOST_BYTES.saturating_add(bytes.len().saturating_mul(8));
-    let mut reader = Reader { document: &document, binary, meshes: Vec::new(), budget };
-    let roots = match document.scenes.get(document.scene) {
-        Some(scene) => scene.nodes.clone(),
-        None => (0..document.nodes.len()).collect(),
+    validate(&root)?;
+    let document = Document::from_json_without_validation(root);
+    let mut scene =
+        Scene { document: &document, placements: &placements.nodes, placed: Vec::new() };
+    let mut visited = vec![false; document.nodes().len()];
+    let default = document.default_scene().or_else(|| document.scenes().next());
+    let roots: Vec<usize> = match default {
+        Some(default) => default.nodes().map(|n| n.index()).collect(),
+        None => (0..visited.len()).collect(),
     };
-    let mut visited = vec![false; document.nodes.len()];
     // y up to z up: a quarter turn about x, exact.
     let upright = DMat4::from_cols_array(&[
         1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, -1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0,
     ]);
     for root in roots {
-        reader.node(root, upright, &mut visited, 0)?;
+        scene.walk(root, upright, &mut visited, 0)?;
     }
-    if reader.meshes.is_empty() {
+    let budget = MOST_BYTES.saturating_add(bytes.len().saturating_mul(8));
+    scene.check_size(budget)?;
+    let mut meshes = Vec::new();
+    for (node, place) in &scene.placed {
+        let Some(node) = document.nodes().nth(*node) else { continue };
+        if let Some(mesh) = node.mesh() {
+            let name = node.name().unwrap_or_default();
+            meshes.extend(placed_mesh(&mesh, name, *place, Numbers { binary })?);
+        }
+    }
+    if meshes.is_empty() {
         return Err(ReadError::content("the scene has no triangle", "export it with meshes"));
     }
-    Ok(Model { unit: LengthUnit::Metre, meshes: reader.meshes, ..Model::default() })
+    Ok(Model { unit: LengthUnit::Metre, meshes, ..Model::default() })
 }
 
 /// The JSON text and the binary part.
@@ -174,254 +148,223 @@ fn chunks(bytes: &[u8]) -> Result<(&str, &[u8]), ReadError> {
     }
 }
 
-struct Reader<'a> {
-    document: &'a Document,
-    binary: &'a [u8],
-    meshes: Vec<Mesh>,
-    budget: usize,
+/// Refuses what the library finds wrong, but for bounds that many exporters leave out, and for
+/// primitives without positions, which are passed over.
+fn validate(root: &Root) -> Result<(), ReadError> {
+    // The library takes this number as it is.
+    let positions = Valid(Semantic::Positions);
+    let primitives = root.meshes.iter().flat_map(|m| &m.primitives);
+    for accessor in primitives.filter_map(|p| p.attributes.get(&positions)) {
+        if accessor.value() >= root.accessors.len() {
+            let what = format!("accessor {} is named and not there", accessor.value());
+            return Err(ReadError::content(what, MEND));
+        }
+    }
+    let mut first = None;
+    root.validate(root, gltf::json::Path::new, &mut |path, fault| {
+        let path = path().to_string();
+        let may_miss = [".min", ".max", "[\"POSITION\"]"].iter().any(|end| path.ends_with(end));
+        if first.is_none() && !(may_miss && matches!(fault, Fault::Missing)) {
+            first = Some(format!("`{path}`: {fault}"));
+        }
+    });
+    first.map_or(Ok(()), |what| Err(ReadError::content(what.to_lowercase(), MEND)))
 }
 
-impl Reader<'_> {
-    fn node(
+struct Scene<'a> {
+    document: &'a Document,
+    placements: &'a [Placement],
+    /// Nodes with meshes, and where they stand.
+    placed: Vec<(usize, DMat4)>,
+}
+
+impl Scene<'_> {
+    fn walk(
         &mut self,
         index: usize,
         parent: DMat4,
         visited: &mut [bool],
         depth: usize,
     ) -> Result<(), ReadError> {
-        let fail = |what: String| Err(ReadError::content(what, "export the scene again"));
-        let Some(node) = self.document.nodes.get(index) else {
-            return fail(format!("node {index} is named and not there"));
-        };
+        let fail = |what: String| Err(ReadError::content(what, MEND));
         if std::mem::replace(&mut visited[index], true) {
             return fail(format!("node {index} has two parents or is its own"));
         }
         if depth > MAX_DEPTH {
             return fail(format!("the nodes are nested deeper than {MAX_DEPTH}"));
         }
-        let here = parent * local(node);
+        let here = parent * self.placements.get(index).map_or(DMat4::IDENTITY, Placement::matrix);
         if !here.is_finite() {
             return fail(format!("node {index} has a placement that is not finite"));
         }
-        if let Some(mesh) = node.mesh {
-            self.mesh(mesh, &node.name, here)?;
+        let Some(node) = self.document.nodes().nth(index) else { return Ok(()) };
+        if node.mesh().is_some() {
+            self.placed.push((index, here));
         }
-        for child in &node.children {
-            self.node(*child, here, visited, depth + 1)?;
-        }
-        Ok(())
-    }
-
-    fn mesh(&mut self, index: usize, name: &str, place: DMat4) -> Result<(), ReadError> {
-        let Some(text) = self.document.meshes.get(index) else {
-            let what = format!("mesh {index} is named and not there");
-            return Err(ReadError::content(what, "export the scene again"));
-        };
-        let mut mesh = Mesh { name: name.to_owned(), ..Mesh::default() };
-        // Primitives that share their vertices share them here too.
-        let mut bases: BTreeMap<usize, u32> = BTreeMap::new();
-        let mut materials: BTreeMap<Option<usize>, u32> = BTreeMap::new();
-        let uniform = text.primitives.windows(2).all(|p| p[0].attributes == p[1].attributes);
-        for primitive in &text.primitives {
-            if !matches!(primitive.mode, LINES | TRIANGLES | STRIP | FAN) {
-                continue;
-            }
-            let Some(&position) = primitive.attributes.get("POSITION") else { continue };
-            let base = match bases.get(&position) {
-                Some(base) => *base,
-                None => {
-                    let base = mesh.positions.len() as u32;
-                    self.vertices(position, primitive, place, uniform, &mut mesh)?;
-                    bases.insert(position, base);
-                    base
-                }
-            };
-            let count = mesh.positions.len() as u32 - base;
-            let corners = match primitive.indices {
-                Some(accessor) => self.indices(accessor, count)?,
-                None => (0..count).collect(),
-            };
-            let next = materials.len() as u32;
-            let group = *materials.entry(primitive.material).or_insert_with(|| {
-                let named = primitive.material.and_then(|m| self.document.materials.get(m));
-                mesh.groups.push(Group::new(named.map_or("", |m| m.name.as_str())));
-                next
-            });
-            let flipped = place.determinant() < 0.0;
-            let mut push = |list: &[u32]| {
-                let list: Vec<u32> = list.iter().map(|i| i + base).collect();
-                match list[..] {
-                    // Strips end one part and begin the next with such triangles.
-                    [a, b, c] if a == b || b == c || c == a => {}
-                    [a, b, c] => {
-                        mesh.faces.push(&if flipped { [a, c, b] } else { [a, b, c] });
-                        mesh.face_groups.push(group);
-                    }
-                    _ => mesh.lines.push(&list),
-                }
-            };
-            match primitive.mode {
-                LINES => corners.chunks_exact(2).for_each(push),
-                TRIANGLES => corners.chunks_exact(3).for_each(push),
-                STRIP => corners.windows(3).enumerate().for_each(|(k, t)| {
-                    push(&if k % 2 == 0 { [t[0], t[1], t[2]] } else { [t[1], t[0], t[2]] });
-                }),
-                _ => corners.windows(2).skip(1).for_each(|t| push(&[corners[0], t[0], t[1]])),
-            }
-        }
-        if mesh.groups.len() < 2 || mesh.face_groups.is_empty() {
-            mesh.groups.clear();
-            mesh.face_groups.clear();
-        }
-        if !mesh.faces.is_empty() || !mesh.lines.is_empty() {
-            self.meshes.push(mesh);
+        for child in node.children() {
+            self.walk(child.index(), here, visited, depth + 1)?;
         }
         Ok(())
     }
 
-    fn vertices(
-        &mut self,
-        position: usize,
-        primitive: &Primitive,
-        place: DMat4,
-        with_data: bool,
-        mesh: &mut Mesh,
-    ) -> Result<(), ReadError> {
-        let points = self.numbers(position, "VEC3")?;
-        for p in points.chunks_exact(3) {
-            let p = DVec3::new(p[0], p[1], p[2]);
-            if !p.is_finite() {
-                let what = format!("accessor {position} has the position {p}");
-                return Err(ReadError::content(what, "coordinates must be finite"));
+    /// Refuses scenes that place their meshes too often, before anything is built.
+    fn check_size(&self, budget: usize) -> Result<(), ReadError> {
+        let mut sizes: BTreeMap<usize, usize> = BTreeMap::new();
+        for mesh in self.document.meshes() {
+            let mut bytes = 0_usize;
+            for primitive in mesh.primitives() {
+                let vertices = primitive.get(&Semantic::Positions).map_or(0, |a| a.count());
+                let corners = primitive.indices().map_or(vertices, |a| a.count());
+                // A strip has three corners per index.
+                let per_corner = match primitive.mode() {
+                    Mode::TriangleStrip | Mode::TriangleFan => 3 * PER_CORNER,
+                    _ => PER_CORNER,
+                };
+                let fields = primitive.attributes().len();
+                let here = vertices.saturating_mul(PER_VERTEX + 8 * fields);
+                bytes = bytes.saturating_add(here);
+                bytes = bytes.saturating_add(corners.saturating_mul(per_corner));
             }
-            mesh.positions.push(place.transform_point3(p));
+            sizes.insert(mesh.index(), bytes);
         }
-        if !with_data {
+        let mut total = 0_usize;
+        for (node, _) in &self.placed {
+            let mesh = self.document.nodes().nth(*node).and_then(|n| n.mesh());
+            total = total.saturating_add(mesh.map_or(0, |m| sizes[&m.index()]));
+        }
+        if total <= budget {
             return Ok(());
         }
-        let count = mesh.positions.len();
-        for (name, accessor) in &primitive.attributes {
-            let fits = self.document.accessors.get(*accessor).is_some_and(|a| a.count == count);
-            if !fits {
-                continue;
+        let what = format!(
+            "the scene places its meshes {} times, which takes {} MB where {} are allowed",
+            self.placed.len(),
+            total >> 20,
+            budget >> 20
+        );
+        Err(ReadError::content(what, "export every mesh once, or fewer instances"))
+    }
+}
+
+/// One mesh in the coordinates of the scene; none if it has neither faces nor lines.
+fn placed_mesh(
+    source: &gltf::Mesh<'_>,
+    name: &str,
+    place: DMat4,
+    numbers: Numbers<'_>,
+) -> Result<Option<Mesh>, ReadError> {
+    let mut mesh = Mesh { name: name.to_owned(), ..Mesh::default() };
+    // Primitives that share their vertices share them here too.
+    let mut bases: BTreeMap<usize, u32> = BTreeMap::new();
+    let mut materials: BTreeMap<Option<usize>, u32> = BTreeMap::new();
+    let listed = |p: &gltf::Primitive<'_>| -> Vec<(Semantic, usize)> {
+        p.attributes().map(|(semantic, accessor)| (semantic, accessor.index())).collect()
+    };
+    let mut lists = source.primitives().map(|p| listed(&p));
+    let first = lists.next();
+    let uniform = lists.all(|list| Some(&list) == first.as_ref());
+    for primitive in source.primitives() {
+        let mode = primitive.mode();
+        if matches!(mode, Mode::Points | Mode::LineLoop | Mode::LineStrip) {
+            continue;
+        }
+        let Some(position) = primitive.get(&Semantic::Positions) else { continue };
+        let base = match bases.get(&position.index()) {
+            Some(base) => *base,
+            None => {
+                let base = mesh.positions.len() as u32;
+                bases.insert(position.index(), base);
+                vertices(position, &primitive, place, uniform, numbers, &mut mesh)?;
+                base
             }
-            if name == "NORMAL" {
+        };
+        let count = mesh.positions.len() - base as usize;
+        let corners = numbers.indices(&primitive, count)?;
+        let corners = corners.unwrap_or_else(|| (0..count as u32).collect());
+        let next = materials.len() as u32;
+        let material = primitive.material();
+        let group = *materials.entry(material.index()).or_insert_with(|| {
+            mesh.groups.push(Group::new(material.name().unwrap_or_default()));
+            next
+        });
+        push_corners(&mut mesh, &corners, mode, base, group, place.determinant() < 0.0);
+    }
+    if mesh.groups.len() < 2 || mesh.face_groups.is_empty() {
+        mesh.groups.clear();
+        mesh.face_groups.clear();
+    }
+    Ok((!mesh.faces.is_empty() || !mesh.lines.is_empty()).then_some(mesh))
+}
+
+fn push_corners(
+    mesh: &mut Mesh,
+    corners: &[u32],
+    mode: Mode,
+    base: u32,
+    group: u32,
+    flipped: bool,
+) {
+    let mut push = |list: [u32; 3]| {
+        let [a, b, c] = list.map(|i| i + base);
+        // Strips end one part and begin the next with triangles that are a line.
+        if a != b && b != c && c != a {
+            mesh.faces.push(&if flipped { [a, c, b] } else { [a, b, c] });
+            mesh.face_groups.push(group);
+        }
+    };
+    match mode {
+        Mode::Triangles => corners.chunks_exact(3).for_each(|t| push([t[0], t[1], t[2]])),
+        Mode::TriangleStrip => corners.windows(3).enumerate().for_each(|(k, t)| {
+            push(if k % 2 == 0 { [t[0], t[1], t[2]] } else { [t[1], t[0], t[2]] });
+        }),
+        Mode::TriangleFan => {
+            corners.windows(2).skip(1).for_each(|t| push([corners[0], t[0], t[1]]));
+        }
+        _ => corners.chunks_exact(2).for_each(|t| mesh.lines.push(&[t[0] + base, t[1] + base])),
+    }
+}
+
+fn vertices(
+    position: gltf::Accessor<'_>,
+    primitive: &gltf::Primitive<'_>,
+    place: DMat4,
+    with_data: bool,
+    numbers: Numbers<'_>,
+    mesh: &mut Mesh,
+) -> Result<(), ReadError> {
+    let index = position.index();
+    for p in numbers.vectors(position)? {
+        let p = DVec3::from_array(p.map(f64::from));
+        if !p.is_finite() {
+            let what = format!("accessor {index} has the position {p}");
+            return Err(ReadError::content(what, "coordinates must be finite"));
+        }
+        mesh.positions.push(place.transform_point3(p));
+    }
+    if !with_data {
+        return Ok(());
+    }
+    let count = mesh.positions.len();
+    for (semantic, accessor) in primitive.attributes() {
+        if accessor.count() != count {
+            continue;
+        }
+        match semantic {
+            Semantic::Normals => {
                 let turn = place.inverse().transpose();
-                let normals = self.numbers(*accessor, "VEC3")?;
-                let normal = |n: &[f64]| {
-                    turn.transform_vector3(DVec3::new(n[0], n[1], n[2])).normalize_or_zero()
+                let normal = |n: [f32; 3]| {
+                    turn.transform_vector3(DVec3::from_array(n.map(f64::from))).normalize_or_zero()
                 };
-                mesh.normals = normals.chunks_exact(3).map(normal).collect();
-            } else if name == "COLOR_0" {
-                let kind = self.document.accessors[*accessor].kind.clone();
-                let per = if kind == "VEC4" { 4 } else { 3 };
-                let colors = self.numbers(*accessor, &kind)?;
-                let color = |c: &[f64]| [c[0] as f32, c[1] as f32, c[2] as f32];
-                mesh.colors = colors.chunks_exact(per).map(color).collect();
-            } else if let Some(field) = name.strip_prefix('_')
-                && self.document.accessors[*accessor].kind == "SCALAR"
-            {
-                let values = self.numbers(*accessor, "SCALAR")?;
-                mesh.vertex_fields.push(Field { name: field.to_owned(), values });
+                mesh.normals = numbers.vectors(accessor)?.into_iter().map(normal).collect();
             }
-        }
-        Ok(())
-    }
-
-    fn indices(&mut self, accessor: usize, vertices: u32) -> Result<Vec<u32>, ReadError> {
-        let numbers = self.numbers(accessor, "SCALAR")?;
-        match numbers.iter().find(|i| !(**i < f64::from(vertices))) {
-            None => Ok(numbers.iter().map(|i| *i as u32).collect()),
-            Some(wrong) => {
-                let what = format!("accessor {accessor} names vertex {wrong} of {vertices}");
-                Err(ReadError::content(what, "export the scene again"))
+            Semantic::Colors(0) => mesh.colors = numbers.colors(primitive)?.unwrap_or_default(),
+            Semantic::Extras(name) => {
+                if let Some(values) = numbers.scalars(accessor)? {
+                    let name = name.strip_prefix('_').unwrap_or(&name).to_owned();
+                    mesh.vertex_fields.push(Field { name, values });
+                }
             }
+            _ => {}
         }
     }
-
-    /// All numbers of an accessor; bytes and shorts that are no indices are shares of their range.
-    fn numbers(&mut self, index: usize, kind: &str) -> Result<Vec<f64>, ReadError> {
-        let fail = |what: String| Err(ReadError::content(what, "export the scene again"));
-        let Some(accessor) = self.document.accessors.get(index) else {
-            return fail(format!("accessor {index} is named and not there"));
-        };
-        let per = match kind {
-            "SCALAR" => 1,
-            "VEC3" => 3,
-            "VEC4" => 4,
-            other => {
-                return fail(format!(
-                    "accessor {index} has the type {}",
-                    crate::error::clip(other)
-                ));
-            }
-        };
-        if accessor.kind != kind {
-            return fail(format!("accessor {index} is not of the type {kind}"));
-        }
-        if accessor.sparse.is_some() {
-            return fail(format!("accessor {index} is sparse"));
-        }
-        let Some((size, read)) = component(accessor.component_type, kind == "SCALAR") else {
-            return fail(format!("accessor {index} has an unknown component type"));
-        };
-        let Some(view) = accessor.buffer_view.and_then(|v| self.document.buffer_views.get(v))
-        else {
-            return fail(format!("accessor {index} has no data"));
-        };
-        let bytes = (view.buffer == 0)
-            .then(|| view.byte_offset.checked_add(view.byte_length))
-            .flatten()
-            .and_then(|end| self.binary.get(view.byte_offset..end))
-            .and_then(|bytes| bytes.get(accessor.byte_offset..));
-        let Some(bytes) = bytes else {
-            return fail(format!("the data of accessor {index} lie outside the file"));
-        };
-        let item = size * per;
-        let stride = view.byte_stride.unwrap_or(item).max(1);
-        let needed = accessor.count.saturating_sub(1).checked_mul(stride);
-        let needed = needed.and_then(|n| n.checked_add(if accessor.count == 0 { 0 } else { item }));
-        if needed.is_none_or(|needed| needed > bytes.len()) {
-            let (count, have) = (accessor.count, bytes.len());
-            return fail(format!("accessor {index} has {count} items, its data {have} bytes"));
-        }
-        // Many accessors may share the same bytes, so what they become is limited too.
-        let cost = accessor.count.saturating_mul(per * 8);
-        self.budget = match self.budget.checked_sub(cost) {
-            Some(left) => left,
-            None => return fail("the scene repeats its meshes too often".to_owned()),
-        };
-        let mut numbers = Vec::with_capacity(accessor.count * per);
-        for k in 0..accessor.count {
-            let item = &bytes[k * stride..k * stride + item];
-            numbers.extend(item.chunks_exact(size).map(read));
-        }
-        Ok(numbers)
-    }
-}
-
-fn local(node: &Node) -> DMat4 {
-    if let Some(matrix) = &node.matrix {
-        return DMat4::from_cols_array(matrix);
-    }
-    DMat4::from_scale_rotation_translation(
-        node.scale.map_or(DVec3::ONE, DVec3::from),
-        node.rotation.map_or(DQuat::IDENTITY, DQuat::from_array),
-        node.translation.map_or(DVec3::ZERO, DVec3::from),
-    )
-}
-
-type Component = (usize, fn(&[u8]) -> f64);
-
-/// Size and reader of a component type.
-fn component(kind: u32, whole: bool) -> Option<Component> {
-    Some(match (kind, whole) {
-        (5121, true) => (1, |b| f64::from(b[0])),
-        (5121, false) => (1, |b| f64::from(b[0]) / 255.0),
-        (5123, true) => (2, |b| f64::from(u16::from_le_bytes([b[0], b[1]]))),
-        (5123, false) => (2, |b| f64::from(u16::from_le_bytes([b[0], b[1]])) / 65535.0),
-        (5125, _) => (4, |b| f64::from(u32::from_le_bytes([b[0], b[1], b[2], b[3]]))),
-        (5126, _) => (4, |b| f64::from(f32::from_le_bytes([b[0], b[1], b[2], b[3]]))),
-        _ => return None,
-    })
+    Ok(())
 }

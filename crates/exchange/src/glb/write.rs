@@ -1,11 +1,24 @@
 //! Writing meshes with colours, measured values and a material per group.
 
-use crate::color::{diverging, diverging_range, palette};
+use crate::color::{field_colors, palette};
 use crate::mesh::Mesh;
 use crate::triangulate::triangulate;
 use crate::unit::LengthUnit;
 use geom_core::{BoundingBox, DVec3};
-use serde_json::{Value, json};
+use gltf::Semantic;
+use gltf::binary::{Glb, Header};
+use gltf::json::accessor::{ComponentType, GenericComponentType, Type};
+use gltf::json::buffer::{Target, View};
+use gltf::json::extras::RawValue;
+use gltf::json::material::{PbrBaseColorFactor, PbrMetallicRoughness, StrengthFactor};
+use gltf::json::mesh::{Mode, Primitive};
+use gltf::json::scene::UnitQuaternion;
+use gltf::json::validation::Checked::Valid;
+use gltf::json::{Accessor, Asset, Buffer, Index, Material, Node, Root, Scene};
+use serde_json::json;
+use std::collections::BTreeMap;
+
+type Attributes = BTreeMap<gltf::json::validation::Checked<Semantic>, Index<Accessor>>;
 
 /// Meshes and polylines as a GLB file.
 ///
@@ -16,36 +29,27 @@ use serde_json::{Value, json};
 ///
 /// glTF is in metres with y up: positions are written in the unit of the model and z up, relative
 /// to the middle of the model (single precision suffices then), and the node of each mesh scales,
-/// turns and moves them.
+/// turns and moves them. What single precision leaves over of the move is a second node.
 #[must_use]
 pub fn write_glb(meshes: &[Mesh], unit: &LengthUnit) -> Vec<u8> {
     let all = meshes.iter().flat_map(|mesh| mesh.positions.iter().copied());
     let center = BoundingBox::of(all).map_or(DVec3::ZERO, BoundingBox::center);
-    let mut file = Glb { center, ..Glb::default() };
+    let mut file = Writer { center, bytes: Vec::new(), root: Root::default(), nodes: Vec::new() };
     for mesh in meshes {
         file.mesh(mesh, unit);
     }
     file.finish(unit)
 }
 
-#[derive(Default)]
-struct Glb {
+struct Writer {
     center: DVec3,
     bytes: Vec<u8>,
-    views: Vec<Value>,
-    accessors: Vec<Value>,
-    meshes: Vec<Value>,
-    materials: Vec<Value>,
-    nodes: Vec<Value>,
+    root: Root,
+    /// The nodes of the meshes.
+    nodes: Vec<Index<Node>>,
 }
 
-const FLOAT: u32 = 5126;
-const UNSIGNED_INT: u32 = 5125;
-const ARRAY_BUFFER: u32 = 34962;
-const ELEMENT_ARRAY_BUFFER: u32 = 34963;
-const LINES: u32 = 1;
-
-impl Glb {
+impl Writer {
     fn mesh(&mut self, mesh: &Mesh, unit: &LengthUnit) {
         if mesh.faces.is_empty() && mesh.lines.is_empty() {
             return;
@@ -56,7 +60,7 @@ impl Glb {
         let position = self.positions(&local);
         let mut primitives = Vec::new();
         if !mesh.faces.is_empty() {
-            let mut attributes = json!({ "POSITION": position });
+            let mut attributes = Attributes::from([(Valid(Semantic::Positions), position)]);
             self.attributes(mesh, &mut attributes);
             for (material, faces) in self.materials_of(mesh) {
                 let mut indices = Vec::new();
@@ -64,9 +68,7 @@ impl Glb {
                     triangulate(&mesh.positions, mesh.faces.get(f), &mut indices);
                 }
                 let indices = self.indices(&indices);
-                primitives.push(json!({
-                    "attributes": attributes, "indices": indices, "material": material
-                }));
+                primitives.push(primitive(attributes.clone(), indices, material, Mode::Triangles));
             }
         }
         if !mesh.lines.is_empty() {
@@ -74,36 +76,49 @@ impl Glb {
             let indices: Vec<u32> = pairs.copied().collect();
             let indices = self.indices(&indices);
             let material = self.material("lines", [0.02, 0.02, 0.02]);
-            primitives.push(json!({
-                "attributes": { "POSITION": position }, "indices": indices,
-                "material": material, "mode": LINES
-            }));
+            let attributes = Attributes::from([(Valid(Semantic::Positions), position)]);
+            primitives.push(primitive(attributes, indices, material, Mode::Lines));
         }
+        let name = Some(mesh.name.clone());
+        let made = gltf::json::Mesh {
+            name: name.clone(),
+            primitives,
+            weights: None,
+            extensions: None,
+            extras: None,
+        };
+        let made = self.root.push(made);
         let s = unit.metres();
-        let (half, c) = (std::f64::consts::FRAC_1_SQRT_2, center * s);
-        self.nodes.push(json!({
-            "name": mesh.name, "mesh": self.meshes.len(),
+        let half = std::f32::consts::FRAC_1_SQRT_2;
+        let [_, rest] = in_two(moved(center * s));
+        let node = Node {
+            name,
+            mesh: Some(made),
             // z up becomes y up by a quarter turn about x.
-            "rotation": [-half, 0.0, 0.0, half],
-            "scale": [s, s, s],
-            "translation": [c.x, c.z, -c.y],
-        }));
-        self.meshes.push(json!({ "name": mesh.name, "primitives": primitives }));
+            rotation: Some(UnitQuaternion([-half, 0.0, 0.0, half])),
+            scale: Some([s as f32; 3]),
+            translation: Some(rest),
+            ..Node::default()
+        };
+        let node = self.root.push(node);
+        self.nodes.push(node);
     }
 
-    fn attributes(&mut self, mesh: &Mesh, attributes: &mut Value) {
+    fn attributes(&mut self, mesh: &Mesh, attributes: &mut Attributes) {
         if !mesh.normals.is_empty() {
             let usable = |n: &DVec3| n.is_finite() && (n.length() - 1.0).abs() < 1e-3;
             // A zero normal is not valid glTF; any unit vector is as good at a singular point.
             let normal = |n: &DVec3| if usable(n) { *n } else { DVec3::Z }.as_vec3();
             let normals: Vec<f32> =
                 mesh.normals.iter().flat_map(|n| normal(n).normalize().to_array()).collect();
-            attributes["NORMAL"] = self.floats(&normals, 3, "VEC3").into();
+            let accessor = self.floats(&normals, Type::Vec3);
+            attributes.insert(Valid(Semantic::Normals), accessor);
         }
         let colors = if mesh.colors.is_empty() { field_colors(mesh) } else { mesh.colors.clone() };
         if !colors.is_empty() {
             let colors: Vec<f32> = colors.iter().flatten().copied().collect();
-            attributes["COLOR_0"] = self.floats(&colors, 3, "VEC3").into();
+            let accessor = self.floats(&colors, Type::Vec3);
+            attributes.insert(Valid(Semantic::Colors(0)), accessor);
         }
         for field in &mesh.vertex_fields {
             let values: Vec<f32> = field
@@ -112,13 +127,13 @@ impl Glb {
                 // Values that are not finite are not valid glTF.
                 .map(|v| if (*v as f32).is_finite() { *v as f32 } else { 0.0 })
                 .collect();
-            let name = format!("_{}", field.name.to_uppercase());
-            attributes[name] = self.floats(&values, 1, "SCALAR").into();
+            let accessor = self.floats(&values, Type::Scalar);
+            attributes.insert(Valid(Semantic::Extras(field.name.to_uppercase())), accessor);
         }
     }
 
     /// Materials with the faces they cover.
-    fn materials_of(&mut self, mesh: &Mesh) -> Vec<(usize, Vec<usize>)> {
+    fn materials_of(&mut self, mesh: &Mesh) -> Vec<(Index<Material>, Vec<usize>)> {
         if mesh.groups.is_empty() {
             let colored = !mesh.colors.is_empty() || !mesh.vertex_fields.is_empty();
             let color = if colored { [1.0; 3] } else { [0.6, 0.62, 0.65] };
@@ -138,23 +153,31 @@ impl Glb {
         result
     }
 
-    fn material(&mut self, name: &str, [r, g, b]: [f32; 3]) -> usize {
-        let material = json!({
-            "name": name, "doubleSided": true,
-            "pbrMetallicRoughness": {
-                "baseColorFactor": [r, g, b, 1.0], "metallicFactor": 0.0, "roughnessFactor": 0.7
-            }
-        });
-        if let Some(same) = self.materials.iter().position(|m| *m == material) {
-            return same;
+    fn material(&mut self, name: &str, [r, g, b]: [f32; 3]) -> Index<Material> {
+        let factor = [r, g, b, 1.0];
+        let same = |m: &Material| {
+            m.name.as_deref() == Some(name)
+                && m.pbr_metallic_roughness.base_color_factor.0 == factor
+        };
+        if let Some(known) = self.root.materials.iter().position(same) {
+            return Index::new(known as u32);
         }
-        self.materials.push(material);
-        self.materials.len() - 1
+        self.root.push(Material {
+            name: Some(name.to_owned()),
+            double_sided: true,
+            pbr_metallic_roughness: PbrMetallicRoughness {
+                base_color_factor: PbrBaseColorFactor(factor),
+                metallic_factor: StrengthFactor(0.0),
+                roughness_factor: StrengthFactor(0.7),
+                ..PbrMetallicRoughness::default()
+            },
+            ..Material::default()
+        })
     }
 
-    fn positions(&mut self, positions: &[[f32; 3]]) -> usize {
+    fn positions(&mut self, positions: &[[f32; 3]]) -> Index<Accessor> {
         let flat: Vec<f32> = positions.iter().flatten().copied().collect();
-        let accessor = self.floats(&flat, 3, "VEC3");
+        let accessor = self.floats(&flat, Type::Vec3);
         let mut low = [f32::INFINITY; 3];
         let mut high = [f32::NEG_INFINITY; 3];
         for p in positions {
@@ -163,91 +186,118 @@ impl Glb {
                 high[c] = high[c].max(p[c]);
             }
         }
-        self.accessors[accessor]["min"] = json!(low);
-        self.accessors[accessor]["max"] = json!(high);
+        let made = &mut self.root.accessors[accessor.value()];
+        (made.min, made.max) = (Some(json!(low)), Some(json!(high)));
         accessor
     }
 
-    fn floats(&mut self, values: &[f32], per_item: usize, kind: &str) -> usize {
+    fn floats(&mut self, values: &[f32], type_: Type) -> Index<Accessor> {
         let bytes: Vec<u8> = values.iter().flat_map(|x| x.to_le_bytes()).collect();
-        let view = self.view(&bytes, ARRAY_BUFFER);
-        self.accessors.push(json!({
-            "bufferView": view, "componentType": FLOAT,
-            "count": values.len() / per_item, "type": kind
-        }));
-        self.accessors.len() - 1
+        let count = values.len() / type_.multiplicity();
+        self.accessor(&bytes, Target::ArrayBuffer, ComponentType::F32, type_, count)
     }
 
-    fn indices(&mut self, indices: &[u32]) -> usize {
+    fn indices(&mut self, indices: &[u32]) -> Index<Accessor> {
         let bytes: Vec<u8> = indices.iter().flat_map(|i| i.to_le_bytes()).collect();
-        let view = self.view(&bytes, ELEMENT_ARRAY_BUFFER);
-        self.accessors.push(json!({
-            "bufferView": view, "componentType": UNSIGNED_INT,
-            "count": indices.len(), "type": "SCALAR"
-        }));
-        self.accessors.len() - 1
+        let target = Target::ElementArrayBuffer;
+        self.accessor(&bytes, target, ComponentType::U32, Type::Scalar, indices.len())
     }
 
-    fn view(&mut self, bytes: &[u8], target: u32) -> usize {
-        let offset = self.bytes.len();
-        self.bytes.extend_from_slice(bytes);
-        self.views.push(json!({
-            "buffer": 0, "byteOffset": offset, "byteLength": bytes.len(), "target": target
-        }));
-        self.views.len() - 1
-    }
-
-    fn finish(self, unit: &LengthUnit) -> Vec<u8> {
-        let nodes: Vec<usize> = (0..self.nodes.len()).collect();
-        let mut document = json!({
-            "asset": {
-                "version": "2.0", "generator": "umbilic",
-                "extras": { "unit": unit.to_string() }
-            },
-            "scene": 0, "scenes": [{}],
-        });
-        // Empty lists are not valid glTF.
-        let mut insert = |key: &str, list: Vec<Value>| {
-            if !list.is_empty() {
-                document[key] = list.into();
-            }
+    fn accessor(
+        &mut self,
+        bytes: &[u8],
+        target: Target,
+        component: ComponentType,
+        type_: Type,
+        count: usize,
+    ) -> Index<Accessor> {
+        let view = View {
+            buffer: Index::new(0),
+            byte_length: bytes.len().into(),
+            byte_offset: Some(self.bytes.len().into()),
+            byte_stride: None,
+            name: None,
+            target: Some(Valid(target)),
+            extensions: None,
+            extras: None,
         };
-        insert("nodes", self.nodes);
-        insert("meshes", self.meshes);
-        insert("materials", self.materials);
-        insert("accessors", self.accessors);
-        insert("bufferViews", self.views);
-        if !nodes.is_empty() {
-            document["scenes"][0]["nodes"] = nodes.into();
-            document["buffers"] = json!([{ "byteLength": self.bytes.len() }]);
+        self.bytes.extend_from_slice(bytes);
+        let view = self.root.push(view);
+        self.root.push(Accessor {
+            buffer_view: Some(view),
+            byte_offset: None,
+            count: count.into(),
+            component_type: Valid(GenericComponentType(component)),
+            type_: Valid(type_),
+            min: None,
+            max: None,
+            name: None,
+            normalized: false,
+            sparse: None,
+            extensions: None,
+            extras: None,
+        })
+    }
+
+    fn finish(mut self, unit: &LengthUnit) -> Vec<u8> {
+        let unit_name = json!({ "unit": unit.to_string() }).to_string();
+        self.root.asset = Asset {
+            generator: Some("Umbilic".to_owned()),
+            extras: RawValue::from_string(unit_name).ok(),
+            ..Asset::default()
+        };
+        let [most, _] = in_two(moved(self.center * unit.metres()));
+        if most != [0.0; 3] && !self.nodes.is_empty() {
+            let children = Some(std::mem::take(&mut self.nodes));
+            let around = Node { children, translation: Some(most), ..Node::default() };
+            let around = self.root.push(around);
+            self.nodes.push(around);
         }
-        let mut text = document.to_string().into_bytes();
-        text.resize(text.len().next_multiple_of(4), b' ');
-        let mut file = Vec::with_capacity(text.len() + self.bytes.len() + 28);
-        let binary = if self.bytes.is_empty() { 0 } else { 8 + self.bytes.len() };
-        let total = 12 + 8 + text.len() + binary;
-        file.extend_from_slice(b"glTF");
-        file.extend_from_slice(&2_u32.to_le_bytes());
-        file.extend_from_slice(&(total as u32).to_le_bytes());
-        file.extend_from_slice(&(text.len() as u32).to_le_bytes());
-        file.extend_from_slice(b"JSON");
-        file.extend_from_slice(&text);
-        if binary > 0 {
-            file.extend_from_slice(&(self.bytes.len() as u32).to_le_bytes());
-            file.extend_from_slice(b"BIN\0");
-            file.extend_from_slice(&self.bytes);
+        if !self.nodes.is_empty() {
+            self.root.buffers.push(Buffer {
+                byte_length: self.bytes.len().into(),
+                name: None,
+                uri: None,
+                extensions: None,
+                extras: None,
+            });
         }
-        file
+        let scene = Scene { nodes: self.nodes, name: None, extensions: None, extras: None };
+        self.root.scene = Some(self.root.push(scene));
+        // Neither plain numbers nor the memory they are written to can fail.
+        let json = serde_json::to_vec(&self.root).unwrap_or_default();
+        let header = Header { magic: *b"glTF", version: 2, length: 0 };
+        let bin = (!self.bytes.is_empty()).then_some(self.bytes.into());
+        Glb { header, json: json.into(), bin }.to_vec().unwrap_or_default()
     }
 }
 
-fn field_colors(mesh: &Mesh) -> Vec<[f32; 3]> {
-    let shown = mesh.vertex_fields.iter().find(|f| f.name == "K").or(mesh.vertex_fields.first());
-    match shown {
-        Some(field) if mesh.groups.is_empty() => {
-            let range = diverging_range(&field.values);
-            field.values.iter().map(|v| diverging(v / range)).collect()
-        }
-        _ => Vec::new(),
+fn primitive(
+    attributes: Attributes,
+    indices: Index<Accessor>,
+    material: Index<Material>,
+    mode: Mode,
+) -> Primitive {
+    Primitive {
+        attributes,
+        indices: Some(indices),
+        material: Some(material),
+        mode: Valid(mode),
+        targets: None,
+        extensions: None,
+        extras: None,
     }
+}
+
+/// A move in the axes of glTF.
+fn moved(by: DVec3) -> DVec3 {
+    DVec3::new(by.x, by.z, -by.y)
+}
+
+/// A move in single precision, and what is left of it. Programs read the decimals of the first
+/// either in single or in double precision, so the rest is measured from the decimals.
+fn in_two(by: DVec3) -> [[f32; 3]; 2] {
+    let most = by.as_vec3().to_array();
+    let decimals = most.map(|x| x.to_string().parse::<f64>().unwrap_or(f64::from(x)));
+    [most, (by - DVec3::from_array(decimals)).as_vec3().to_array()]
 }

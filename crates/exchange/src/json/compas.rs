@@ -100,7 +100,7 @@ pub(super) fn read(text: &str) -> Result<Model, ReadError> {
             _ if kind.ends_with("NurbsSurface") => {
                 let name = item.name.clone().unwrap_or_default();
                 let surface = surface(item.data, &title)?;
-                model.surfaces.push(NamedSurface { name, surface });
+                model.surfaces.push(NamedSurface::new(name, surface));
             }
             other => model.warnings.push(format!("{title} is a {} and left out", clip(other))),
         }

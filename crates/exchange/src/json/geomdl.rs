@@ -67,7 +67,7 @@ pub(super) fn read(text: &str) -> Result<Model, ReadError> {
         let title = format!("surface {}", k + 1);
         let name = surface.name.clone();
         let surface = build(surface).map_err(|e| refused(&title, &e.to_string()))?;
-        model.surfaces.push(NamedSurface { name, surface });
+        model.surfaces.push(NamedSurface::new(name, surface));
     }
     if model.surfaces.is_empty() {
         return Err(ReadError::content("the file has no surface", "export one"));

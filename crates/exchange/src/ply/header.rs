@@ -85,7 +85,7 @@ pub(super) fn read_header(bytes: &[u8]) -> Result<Header, ReadError> {
         number += 1;
         Some((String::from_utf8_lossy(&rest[..end]).trim_end().to_owned(), number, at))
     };
-    if next().is_none_or(|(line, ..)| line != "ply") {
+    if next().is_none_or(|(line, ..)| !line.eq_ignore_ascii_case("ply")) {
         return Err(ReadError::text(1, "the file does not begin with `ply`", "export it again"));
     }
     let mut header = Header {

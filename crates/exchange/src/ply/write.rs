@@ -19,7 +19,7 @@ pub fn write_ply(meshes: &[Mesh], unit: &LengthUnit) -> Vec<u8> {
     let vertex_fields = names(meshes, |m| &m.vertex_fields);
     let face_fields = names(meshes, |m| &m.face_fields);
     // Writing into a `String` cannot fail.
-    let mut header = String::from("ply\nformat binary_little_endian 1.0\ncomment umbilic\n");
+    let mut header = String::from("ply\nformat binary_little_endian 1.0\ncomment Umbilic\n");
     let _ = writeln!(header, "comment unit {}", one_line(&unit.to_string()));
     if let [only] = meshes
         && !only.name.is_empty()

@@ -1,14 +1,6 @@
-//! The four border curves of a surface, and which of them coincide or collapse.
+//! The four sides of a surface as curves, and which of them coincide or collapse.
 
-use bspline::{BsplineSurface, KnotVector};
-use geom_core::DVec3;
-
-/// A border curve: the control points of a curve over the knots of the other direction.
-#[derive(Clone, Debug, PartialEq)]
-pub(crate) struct Border {
-    pub(crate) points: Vec<DVec3>,
-    pub(crate) weights: Option<Vec<f64>>,
-}
+use bspline::{BsplineCurve, BsplineSurface, KnotVector, SplineError};
 
 /// A side of the parameter rectangle.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -19,51 +11,47 @@ pub(crate) enum Side {
     VEnd,
 }
 
-impl Border {
-    /// The border of `surface` on a side, with the control points of the surface itself where the
-    /// knots are clamped.
-    pub(crate) fn of(surface: &BsplineSurface, side: Side) -> Self {
-        let across_u = matches!(side, Side::UStart | Side::UEnd);
-        let knots = if across_u { surface.knots_u() } else { surface.knots_v() };
-        let (n, n_v) = (if across_u { surface.n_v() } else { surface.n_u() }, surface.n_v());
-        let index = |row: usize, k: usize| if across_u { row * n_v + k } else { k * n_v + row };
-        let at_end = matches!(side, Side::UEnd | Side::VEnd);
-        let blend = blend(knots, at_end);
-        let (mut points, mut weights) = (Vec::with_capacity(n), Vec::with_capacity(n));
-        for k in 0..n {
-            let weight_of = |row: usize| surface.weights().map_or(1.0, |w| w[index(row, k)]);
-            if let [(row, _)] = blend[..] {
-                points.push(surface.control_points()[index(row, k)]);
-                weights.push(weight_of(row));
-                continue;
-            }
-            let weight: f64 = blend.iter().map(|&(row, b)| b * weight_of(row)).sum();
-            let point: DVec3 = blend
-                .iter()
-                .map(|&(row, b)| b * weight_of(row) * surface.control_points()[index(row, k)])
-                .sum();
-            points.push(point / weight);
-            weights.push(weight);
-        }
-        Self { points, weights: surface.is_rational().then_some(weights) }
+/// Border curves, indexed by [`Side`], and the directions in which the surface closes within a
+/// distance.
+pub(crate) struct Borders {
+    sides: [BsplineCurve; 4],
+    pub(crate) closed_u: bool,
+    pub(crate) closed_v: bool,
+}
+
+impl Borders {
+    pub(crate) fn of(surface: &BsplineSurface, close: f64) -> Result<Self, SplineError> {
+        let ((u0, u1), (v0, v1)) = (surface.knots_u().domain(), surface.knots_v().domain());
+        let sides = [
+            surface.curve_at_u(u0)?,
+            surface.curve_at_u(u1)?,
+            surface.curve_at_v(v0)?,
+            surface.curve_at_v(v1)?,
+        ];
+        let closed = |knots: &KnotVector, a: &BsplineCurve, b: &BsplineCurve| {
+            knots.is_periodic() || (meet(a, b, close) && !is_near_point(a, close))
+        };
+        let closed_u = closed(surface.knots_u(), &sides[0], &sides[1]);
+        let closed_v = closed(surface.knots_v(), &sides[2], &sides[3]);
+        Ok(Self { sides, closed_u, closed_v })
     }
 
-    /// Whether the whole side is one point (a pole).
-    pub(crate) fn is_collapsed(&self) -> bool {
-        self.points.windows(2).all(|pair| pair[0] == pair[1])
+    pub(crate) fn side(&self, side: Side) -> &BsplineCurve {
+        &self.sides[side as usize]
     }
 }
 
-/// The rows that matter at an end of the domain with their basis values; one row if clamped there.
-fn blend(knots: &KnotVector, at_end: bool) -> Vec<(usize, f64)> {
-    let (d, all) = (knots.degree().get(), knots.knots());
-    let (start, end) = knots.domain();
-    if !knots.is_periodic() {
-        let ends = if at_end { &all[all.len() - d - 1..] } else { &all[..=d] };
-        if ends.iter().all(|t| *t == ends[0]) {
-            return vec![(if at_end { knots.control_count() - 1 } else { 0 }, 1.0)];
-        }
-    }
-    let basis = knots.basis(if at_end { end } else { start }, 0);
-    (0..=d).map(|r| (knots.control_index(basis.span, r), basis.values[0][r])).collect()
+/// Whether two sides are the same curve within a distance.
+fn meet(a: &BsplineCurve, b: &BsplineCurve, close: f64) -> bool {
+    let weight = |c: &BsplineCurve, k: usize| c.weights().map_or(1.0, |w| w[k]);
+    let mut pairs = a.control_points().iter().zip(b.control_points()).enumerate();
+    pairs.all(|(k, (p, q))| {
+        p.distance(*q) <= close && (weight(a, k) / weight(b, k) - 1.0).abs() <= 1e-9
+    })
+}
+
+/// Whether a curve is one point (a pole) within a distance.
+pub(crate) fn is_near_point(curve: &BsplineCurve, close: f64) -> bool {
+    let points = curve.control_points();
+    points.iter().all(|p| p.distance(points[0]) <= close)
 }

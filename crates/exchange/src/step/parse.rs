@@ -341,6 +341,69 @@ impl<'a> Cursor<'a> {
         }
     }
 
+    /// Goes past `n` arguments and the commas behind them.
+    pub(super) fn skip_arguments(&mut self, n: usize) -> Result<(), ReadError> {
+        for _ in 0..n {
+            self.skip_value()?;
+            self.comma()?;
+        }
+        Ok(())
+    }
+
+    /// A reference, or nothing for `$` and `*`.
+    pub(super) fn optional_reference(&mut self) -> Result<Option<u64>, ReadError> {
+        self.space();
+        if self.take(b"$") || self.take(b"*") {
+            return Ok(None);
+        }
+        self.reference().map(Some)
+    }
+
+    /// A list of references; `$` is an empty one.
+    pub(super) fn reference_list(&mut self) -> Result<Vec<u64>, ReadError> {
+        let mut ids = Vec::new();
+        self.space();
+        if self.take(b"$") {
+            return Ok(ids);
+        }
+        self.list(|c| {
+            ids.push(c.reference()?);
+            Ok(())
+        })?;
+        Ok(ids)
+    }
+
+    /// A list of numbers.
+    pub(super) fn real_list(&mut self) -> Result<Vec<f64>, ReadError> {
+        let mut values = Vec::new();
+        self.list(|c| {
+            values.push(c.real()?);
+            Ok(())
+        })?;
+        Ok(values)
+    }
+
+    /// A number, bare or with its type as in `LENGTH_MEASURE(25.4)`.
+    pub(super) fn measure(&mut self) -> Result<f64, ReadError> {
+        self.space();
+        let mut typed = self.clone();
+        let word = typed.word();
+        typed.space();
+        if word.first().is_some_and(u8::is_ascii_alphabetic) && typed.take(b"(") {
+            let value = typed.real()?;
+            typed.expect(b')')?;
+            *self = typed;
+            return Ok(value);
+        }
+        self.real()
+    }
+
+    /// Whether a reference comes next.
+    pub(super) fn at_reference(&mut self) -> bool {
+        self.space();
+        self.peek() == Some(b'#')
+    }
+
     pub(super) fn reference(&mut self) -> Result<u64, ReadError> {
         self.space();
         self.try_reference().ok_or_else(|| self.unexpected("a reference such as #12"))

@@ -1,8 +1,14 @@
 //! Texts of STEP files: plain ASCII with control directives (ISO 10303-21, section 6.4.3).
 
+use std::borrow::Cow;
+
 /// The characters between the quotes, as people read them; faulty directives are kept as they are.
 pub(super) fn decode(raw: &[u8]) -> String {
-    let raw = String::from_utf8_lossy(raw);
+    // Some programs write the bytes of ISO 8859-1 as they are, which the standard forbids.
+    let raw = match std::str::from_utf8(raw) {
+        Ok(text) => Cow::Borrowed(text),
+        Err(_) => raw.iter().map(|b| char::from(*b)).collect(),
+    };
     let mut text = String::with_capacity(raw.len());
     let mut rest = raw.as_ref();
     while let Some(c) = rest.chars().next() {
@@ -62,6 +68,8 @@ mod tests {
         assert_eq!(decode(b"Dach \\X2\\00E9D83DDE00\\X0\\!"), "Dach é😀!");
         assert_eq!(decode(b"\\X4\\0001F600\\X0\\"), "😀");
         assert_eq!(decode(b"\\X\\E9\\S\\i"), "éé");
+        assert_eq!(decode(b"Dach \xe4\xdf"), "Dach äß");
+        assert_eq!(decode("Dach äß".as_bytes()), "Dach äß");
         for bad in ["\\X2\\00", "\\X2\\0\\X0\\", "\\X\\G", "\\S", "\\X4\\FFFFFFFF\\X0\\"] {
             assert_eq!(decode(bad.as_bytes()), bad);
         }

@@ -1,38 +1,44 @@
-//! Writing: one open shell of named faces, each on the whole of its surface.
+//! Writing: faces sewn into shells, trims and colours kept.
 
-use super::border::{Border, Side};
-use crate::model::Model;
+use super::sew::{Sewn, SewnFace, Use, sew, tolerance};
+use crate::color::display;
+use crate::model::{Model, NamedSurface};
 use crate::unit::LengthUnit;
 use crate::wrapped::wrapped;
-use bspline::{BsplineSurface, KnotVector};
-use geom_core::{BoundingBox, DVec3};
+use bspline::{BsplineCurve, BsplineSurface, KnotVector, SplineError};
+use geom_core::DVec3;
+use std::collections::HashMap;
 use std::fmt::Write;
 
 /// Uncertainty of positions that the file states, as a share of the bounding box.
 const UNCERTAINTY: f64 = 1e-7;
 
-/// The surfaces of a model as a STEP file of application protocol 214: one `OPEN_SHELL` with an
-/// `ADVANCED_FACE` for each. Knots, weights and control points are exact; a periodic surface is
-/// written with unclamped knots and its first control points repeated at the end.
-#[must_use]
-pub fn write_step(model: &Model) -> String {
+/// The surfaces of a model as a STEP file of application protocol 214, an `ADVANCED_FACE` for
+/// each. Faces with a border curve in common share its edge and vertices and stand in one shell;
+/// a closed shell is a `MANIFOLD_SOLID_BREP` with its normals outside. Where a face must be turned
+/// over for that, its parameters are swapped. Knots, weights and control points are exact; a
+/// periodic surface is written with unclamped knots and its first control points repeated at the
+/// end. Trims are written as curves in space and in the parameter plane.
+///
+/// # Errors
+/// [`SplineError`] if the numbers of an extreme surface leave the range of `f64`.
+pub fn write_step(model: &Model) -> Result<String, SplineError> {
+    let sewn = sew(&model.surfaces, tolerance(&model.surfaces, UNCERTAINTY))?;
     let mut file = Writer::default();
     let context = file.header(model);
-    let faces: Vec<usize> =
-        model.surfaces.iter().map(|named| file.face(&named.name, &named.surface)).collect();
-    let shell = file.add(&format!("OPEN_SHELL('',{})", refs(&faces)));
-    let body = file.add(&format!("SHELL_BASED_SURFACE_MODEL('',(#{shell}))"));
-    let shape = file
-        .add(&format!("MANIFOLD_SURFACE_SHAPE_REPRESENTATION('',(#{body}),#{})", context.geometry));
-    file.add(&format!("SHAPE_DEFINITION_REPRESENTATION(#{},#{shape})", context.product));
+    let faces = file.faces(&model.surfaces, &sewn);
+    file.shells(&sewn, &faces, &context);
+    file.colors(&model.surfaces, &faces, &context);
     file.text.push_str("ENDSEC;\nEND-ISO-10303-21;\n");
-    file.text
+    Ok(file.text)
 }
 
 #[derive(Default)]
 struct Writer {
     text: String,
     last: usize,
+    /// The context of parameter planes, once there is one.
+    plane: Option<usize>,
 }
 
 struct Context {
@@ -58,7 +64,7 @@ impl Writer {
         let _ = write!(
             self.text,
             "ISO-10303-21;\nHEADER;\nFILE_DESCRIPTION((''),'2;1');\n\
-             FILE_NAME({name},'2000-01-01T00:00:00',(''),(''),'umbilic','umbilic','');\n\
+             FILE_NAME({name},'2000-01-01T00:00:00',(''),(''),'Umbilic','Umbilic','');\n\
              FILE_SCHEMA(('AUTOMOTIVE_DESIGN {{ 1 0 10303 214 1 1 1 1 }}'));\nENDSEC;\nDATA;\n"
         );
         let application = self.add("APPLICATION_CONTEXT('automotive design')");
@@ -77,9 +83,7 @@ impl Writer {
         let length = self.length_unit(&model.unit);
         let angle = self.add("(NAMED_UNIT(*)PLANE_ANGLE_UNIT()SI_UNIT($,.RADIAN.))");
         let solid = self.add("(NAMED_UNIT(*)SI_UNIT($,.STERADIAN.)SOLID_ANGLE_UNIT())");
-        let points = model.surfaces.iter().flat_map(|s| s.surface.control_points());
-        let size = BoundingBox::of(points.copied()).map_or(1.0, BoundingBox::diagonal);
-        let accuracy = real(if size > 0.0 { size * UNCERTAINTY } else { UNCERTAINTY });
+        let accuracy = real(tolerance(&model.surfaces, UNCERTAINTY));
         let accuracy = self.add(&format!(
             "UNCERTAINTY_MEASURE_WITH_UNIT(LENGTH_MEASURE({accuracy}),#{length},'distance_accuracy_value','')"
         ));
@@ -125,11 +129,155 @@ impl Writer {
         self.add(&format!("CARTESIAN_POINT('',({},{},{}))", real(p.x), real(p.y), real(p.z)))
     }
 
-    fn face(&mut self, name: &str, surface: &BsplineSurface) -> usize {
-        let bound = self.natural_bound(surface);
-        let geometry = self.surface(name, surface);
-        let name = string(name);
-        self.add(&format!("ADVANCED_FACE({name},(#{bound}),#{geometry},.T.)"))
+    /// All faces in the order of the model, after the edges they share.
+    fn faces(&mut self, surfaces: &[NamedSurface], sewn: &Sewn) -> Vec<usize> {
+        let mut vertices: Vec<usize> = Vec::with_capacity(sewn.vertices.len());
+        for p in &sewn.vertices {
+            let point = self.point(*p);
+            vertices.push(self.add(&format!("VERTEX_POINT('',#{point})")));
+        }
+        let mut geometry: Vec<usize> = Vec::with_capacity(sewn.faces.len());
+        for (face, named) in sewn.faces.iter().zip(surfaces) {
+            geometry.push(self.surface(&named.name, &face.surface));
+        }
+        let courses = courses(sewn);
+        let mut edges: Vec<usize> = Vec::with_capacity(sewn.edges.len());
+        for (k, edge) in sewn.edges.iter().enumerate() {
+            let [from, to] = edge.vertices;
+            let mut curve = if edge.is_straight {
+                self.line(sewn.vertices[from], sewn.vertices[to])
+            } else {
+                self.curve(&edge.curve, from == to, 3)
+            };
+            if let Some(planar) = courses.get(&k) {
+                curve = self.curve_on_surfaces(curve, planar, &geometry);
+            }
+            let (from, to) = (vertices[from], vertices[to]);
+            edges.push(self.add(&format!("EDGE_CURVE('',#{from},#{to},#{curve},.T.)")));
+        }
+        let mut faces = Vec::with_capacity(sewn.faces.len());
+        for ((face, named), surface) in sewn.faces.iter().zip(surfaces).zip(&geometry) {
+            let bounds = refs(&self.bounds(face, &edges, &vertices));
+            let name = string(&named.name);
+            faces.push(self.add(&format!("ADVANCED_FACE({name},{bounds},#{surface},.T.)")));
+        }
+        faces
+    }
+
+    fn bounds(&mut self, face: &SewnFace, edges: &[usize], vertices: &[usize]) -> Vec<usize> {
+        let mut bounds = Vec::with_capacity(face.loops.len());
+        for (k, uses) in face.loops.iter().enumerate() {
+            let mut oriented = Vec::with_capacity(uses.len());
+            for Use { edge, forward, .. } in uses {
+                let (edge, forward) = (edges[*edge], logical(*forward));
+                oriented.push(self.add(&format!("ORIENTED_EDGE('',*,*,#{edge},{forward})")));
+            }
+            let bound = if oriented.is_empty() {
+                if k > 0 {
+                    continue;
+                }
+                self.add(&format!("VERTEX_LOOP('',#{})", vertices[face.point]))
+            } else {
+                self.add(&format!("EDGE_LOOP('',{})", refs(&oriented)))
+            };
+            let kind = if k == 0 { "FACE_OUTER_BOUND" } else { "FACE_BOUND" };
+            bounds.push(self.add(&format!("{kind}('',#{bound},.T.)")));
+        }
+        bounds
+    }
+
+    /// Closed shells as solids, the others as surfaces.
+    fn shells(&mut self, sewn: &Sewn, faces: &[usize], context: &Context) {
+        let (mut solids, mut open) = (Vec::new(), Vec::new());
+        for shell in &sewn.shells {
+            let ids: Vec<usize> = shell.faces.iter().map(|f| faces[*f]).collect();
+            if shell.is_closed {
+                let shell = self.add(&format!("CLOSED_SHELL('',{})", refs(&ids)));
+                solids.push(self.add(&format!("MANIFOLD_SOLID_BREP('',#{shell})")));
+            } else {
+                open.push(self.add(&format!("OPEN_SHELL('',{})", refs(&ids))));
+            }
+        }
+        let geometry = context.geometry;
+        let mut shapes = Vec::new();
+        if !open.is_empty() {
+            let body = self.add(&format!("SHELL_BASED_SURFACE_MODEL('',{})", refs(&open)));
+            shapes.push(
+                self.add(&format!(
+                    "MANIFOLD_SURFACE_SHAPE_REPRESENTATION('',(#{body}),#{geometry})"
+                )),
+            );
+        }
+        if !solids.is_empty() {
+            let solids = refs(&solids);
+            shapes.push(
+                self.add(&format!("ADVANCED_BREP_SHAPE_REPRESENTATION('',{solids},#{geometry})")),
+            );
+        }
+        let shape = match shapes[..] {
+            [only] => only,
+            _ => {
+                // Solids and surfaces stand in the coordinates of one shape.
+                let origin = self.point(DVec3::ZERO);
+                let axes = [DVec3::Z, DVec3::X].map(|axis| self.direction(axis));
+                let frame = self
+                    .add(&format!("AXIS2_PLACEMENT_3D('',#{origin},#{},#{})", axes[0], axes[1]));
+                let shape = self.add(&format!("SHAPE_REPRESENTATION('',(#{frame}),#{geometry})"));
+                for other in shapes {
+                    self.add(&format!(
+                        "SHAPE_REPRESENTATION_RELATIONSHIP('','',#{shape},#{other})"
+                    ));
+                }
+                shape
+            }
+        };
+        self.add(&format!("SHAPE_DEFINITION_REPRESENTATION(#{},#{shape})", context.product));
+    }
+
+    /// A style for every colour, and which faces have it.
+    fn colors(&mut self, surfaces: &[NamedSurface], faces: &[usize], context: &Context) {
+        let mut styles: Vec<([f32; 3], usize)> = Vec::new();
+        let mut items = Vec::new();
+        for (named, face) in surfaces.iter().zip(faces) {
+            let Some(color) = named.color else { continue };
+            let style = match styles.iter().find(|(known, _)| *known == color) {
+                Some((_, style)) => *style,
+                None => {
+                    let style = self.style(color);
+                    styles.push((color, style));
+                    style
+                }
+            };
+            items.push(self.add(&format!("STYLED_ITEM('',(#{style}),#{face})")));
+        }
+        if !items.is_empty() {
+            let (items, geometry) = (refs(&items), context.geometry);
+            self.add(&format!(
+                "MECHANICAL_DESIGN_GEOMETRIC_PRESENTATION_REPRESENTATION('',{items},#{geometry})"
+            ));
+        }
+    }
+
+    fn style(&mut self, color: [f32; 3]) -> usize {
+        let [r, g, b] = color.map(|c| real(display(f64::from(c)).clamp(0.0, 1.0)));
+        let color = self.add(&format!("COLOUR_RGB('',{r},{g},{b})"));
+        let color = self.add(&format!("FILL_AREA_STYLE_COLOUR('',#{color})"));
+        let fill = self.add(&format!("FILL_AREA_STYLE('',(#{color}))"));
+        let area = self.add(&format!("SURFACE_STYLE_FILL_AREA(#{fill})"));
+        let side = self.add(&format!("SURFACE_SIDE_STYLE('',(#{area}))"));
+        let usage = self.add(&format!("SURFACE_STYLE_USAGE(.BOTH.,#{side})"));
+        self.add(&format!("PRESENTATION_STYLE_ASSIGNMENT((#{usage}))"))
+    }
+
+    fn direction(&mut self, d: DVec3) -> usize {
+        self.add(&format!("DIRECTION('',({},{},{}))", real(d.x), real(d.y), real(d.z)))
+    }
+
+    fn line(&mut self, from: DVec3, to: DVec3) -> usize {
+        let origin = self.point(from);
+        let direction = self.direction((to - from).normalize_or(DVec3::X));
+        let vector = self.add(&format!("VECTOR('',#{direction},1.)"));
+        self.add(&format!("LINE('',#{origin},#{vector})"))
     }
 
     fn surface(&mut self, name: &str, surface: &BsplineSurface) -> usize {
@@ -141,13 +289,22 @@ impl Writer {
             list(rows_u.iter().map(row))
         };
         let net = grid(&|k| format!("#{}", ids[k]));
-        let borders = Borders::of(surface);
+        let closed = |knots: &KnotVector, first: &dyn Fn(usize) -> [usize; 2], n: usize| {
+            knots.is_periodic()
+                || (0..n).all(|k| {
+                    let [a, b] = first(k);
+                    surface.control_points()[a] == surface.control_points()[b]
+                })
+        };
+        let (n_u, n_v) = (surface.n_u(), surface.n_v());
+        let closed_u = closed(surface.knots_u(), &|j| [j, (n_u - 1) * n_v + j], n_v);
+        let closed_v = closed(surface.knots_v(), &|i| [i * n_v, i * n_v + n_v - 1], n_u);
         let form = format!(
             "{},{},{net},.UNSPECIFIED.,{},{},.U.",
             surface.degree_u(),
             surface.degree_v(),
-            logical(borders.closed_u),
-            logical(borders.closed_v)
+            logical(closed_u),
+            logical(closed_v)
         );
         let (mult_u, knots_u) = knot_lists(surface.knots_u());
         let (mult_v, knots_v) = knot_lists(surface.knots_v());
@@ -164,14 +321,19 @@ impl Writer {
         ))
     }
 
-    fn curve(&mut self, border: &Border, knots: &KnotVector, closed: bool) -> usize {
+    /// A curve in space, or with two coordinates in a parameter plane.
+    fn curve(&mut self, curve: &BsplineCurve, closed: bool, dimension: usize) -> usize {
+        let knots = curve.knots();
         let rows = wrapped(knots);
-        let ids: Vec<usize> = border.points.iter().map(|p| self.point(*p)).collect();
+        let mut ids = Vec::with_capacity(curve.control_points().len());
+        for p in curve.control_points() {
+            ids.push(if dimension == 3 { self.point(*p) } else { self.flat_point(*p) });
+        }
         let net = list(rows.iter().map(|&k| format!("#{}", ids[k])));
         let form = format!("{},{net},.UNSPECIFIED.,{},.U.", knots.degree(), logical(closed));
         let (multiplicities, values) = knot_lists(knots);
         let knots = format!("{multiplicities},{values},.UNSPECIFIED.");
-        let Some(weights) = &border.weights else {
+        let Some(weights) = curve.weights() else {
             return self.add(&format!("B_SPLINE_CURVE_WITH_KNOTS('',{form},{knots})"));
         };
         let weights = list(rows.iter().map(|&k| real(weights[k])));
@@ -181,79 +343,52 @@ impl Writer {
         ))
     }
 
-    /// The loop around the whole parameter rectangle. A closed surface runs its seam twice, in
-    /// opposite directions; a side that is one point has no edge.
-    fn natural_bound(&mut self, surface: &BsplineSurface) -> usize {
-        let borders = Borders::of(surface);
-        let ((u0, u1), (v0, v1)) = (surface.knots_u().domain(), surface.knots_v().domain());
-        // The end of a closed direction is its start, to the last bit.
-        let u1 = if borders.closed_u { u0 } else { u1 };
-        let v1 = if borders.closed_v { v0 } else { v1 };
-        let corners = [(u0, v0), (u1, v0), (u1, v1), (u0, v1)].map(|(u, v)| surface.point(u, v));
-        let mut vertices: Vec<(DVec3, usize)> = Vec::new();
-        let corners = corners.map(|p| {
-            if let Some((_, id)) = vertices.iter().find(|(q, _)| *q == p) {
-                return *id;
-            }
-            let point = self.point(p);
-            let id = self.add(&format!("VERTEX_POINT('',#{point})"));
-            vertices.push((p, id));
-            id
-        });
-        let edge = |file: &mut Self, side: Side, from: usize, to: usize| {
-            let border = &borders.sides[side as usize];
-            if border.is_collapsed() {
-                return None;
-            }
-            let along_v = matches!(side, Side::UStart | Side::UEnd);
-            let (knots, closed) = if along_v {
-                (surface.knots_v(), borders.closed_v)
-            } else {
-                (surface.knots_u(), borders.closed_u)
-            };
-            let curve = file.curve(border, knots, closed);
-            let (from, to) = (corners[from], corners[to]);
-            Some(file.add(&format!("EDGE_CURVE('',#{from},#{to},#{curve},.T.)")))
+    fn flat_point(&mut self, p: DVec3) -> usize {
+        self.add(&format!("CARTESIAN_POINT('',({},{}))", real(p.x), real(p.y)))
+    }
+
+    /// A curve in space with its courses in the parameter planes of trimmed faces.
+    fn curve_on_surfaces(
+        &mut self,
+        curve: usize,
+        courses: &[(usize, BsplineCurve)],
+        surfaces: &[usize],
+    ) -> usize {
+        let plane = match self.plane {
+            Some(plane) => plane,
+            None => self.add(
+                "(GEOMETRIC_REPRESENTATION_CONTEXT(2)PARAMETRIC_REPRESENTATION_CONTEXT()\
+                 REPRESENTATION_CONTEXT('',''))",
+            ),
         };
-        let bottom = edge(self, Side::VStart, 0, 1);
-        let left = edge(self, Side::UStart, 0, 3);
-        let right = if borders.closed_u { left } else { edge(self, Side::UEnd, 1, 2) };
-        let top = if borders.closed_v { bottom } else { edge(self, Side::VEnd, 3, 2) };
-        let turns = [(bottom, true), (right, true), (top, false), (left, false)];
-        let mut oriented = Vec::new();
-        for (edge, forward) in turns {
-            if let Some(edge) = edge {
-                let forward = logical(forward);
-                oriented.push(self.add(&format!("ORIENTED_EDGE('',*,*,#{edge},{forward})")));
+        self.plane = Some(plane);
+        let mut planar = Vec::with_capacity(courses.len());
+        for (face, course) in courses {
+            let closed = false;
+            let course = self.curve(course, closed, 2);
+            let definition =
+                self.add(&format!("DEFINITIONAL_REPRESENTATION('',(#{course}),#{plane})"));
+            planar.push(self.add(&format!("PCURVE('',#{},#{definition})", surfaces[*face])));
+        }
+        let is_seam = matches!(courses, [(a, _), (b, _)] if a == b);
+        let kind = if is_seam { "SEAM_CURVE" } else { "SURFACE_CURVE" };
+        self.add(&format!("{kind}('',#{curve},{},.CURVE_3D.)", refs(&planar)))
+    }
+}
+
+/// The courses of every edge in the parameter planes of trimmed faces, in the direction of the
+/// edge.
+fn courses(sewn: &Sewn) -> HashMap<usize, Vec<(usize, BsplineCurve)>> {
+    let mut courses: HashMap<usize, Vec<(usize, BsplineCurve)>> = HashMap::new();
+    for (k, face) in sewn.faces.iter().enumerate() {
+        for made in face.loops.iter().flatten() {
+            if let Some(course) = &made.parameters {
+                let course = if made.forward { course.clone() } else { course.reversed() };
+                courses.entry(made.edge).or_default().push((k, course));
             }
         }
-        let bound = if oriented.is_empty() {
-            self.add(&format!("VERTEX_LOOP('',#{})", corners[0]))
-        } else {
-            self.add(&format!("EDGE_LOOP('',{})", refs(&oriented)))
-        };
-        self.add(&format!("FACE_OUTER_BOUND('',#{bound},.T.)"))
     }
-}
-
-/// Border curves, indexed by [`Side`], and the directions in which the surface closes.
-struct Borders {
-    sides: [Border; 4],
-    closed_u: bool,
-    closed_v: bool,
-}
-
-impl Borders {
-    fn of(surface: &BsplineSurface) -> Self {
-        let sides = [Side::UStart, Side::UEnd, Side::VStart, Side::VEnd]
-            .map(|side| Border::of(surface, side));
-        let closed = |knots: &KnotVector, a: &Border, b: &Border| {
-            knots.is_periodic() || (a == b && !a.is_collapsed())
-        };
-        let closed_u = closed(surface.knots_u(), &sides[0], &sides[1]);
-        let closed_v = closed(surface.knots_v(), &sides[2], &sides[3]);
-        Self { sides, closed_u, closed_v }
-    }
+    courses
 }
 
 fn knot_lists(knots: &KnotVector) -> (String, String) {

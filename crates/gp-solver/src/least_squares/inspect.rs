@@ -13,6 +13,22 @@ impl System<'_> {
     /// The Jacobian of all residual rows at the last linearisation, weights included: rows in the
     /// order of the blocks, columns by position (the unknown behind each is
     /// [`order`](Self::order)).
+    ///
+    /// # Example
+    /// ```
+    /// use gp_solver::{Factorization, Problem, QuadraticBuilder, System};
+    /// let mut product = QuadraticBuilder::new("area");
+    /// product.equation(1.0).product(0, 1, 1.0).constant(-6.0); // x y = 6
+    /// let mut problem = Problem::new(2);
+    /// problem.add(product.build());
+    /// let mut system = System::new(problem, Factorization::Band)?;
+    /// system.linearize(&[2.0, 5.0])?;
+    /// let mut entries = system.jacobian_triplets();
+    /// entries.iter_mut().for_each(|entry| entry.1 = system.order()[entry.1]); // by unknown
+    /// entries.sort_by_key(|entry| entry.1);
+    /// assert_eq!(entries, [(0, 0, 5.0), (0, 1, 2.0)]);
+    /// # Ok::<(), gp_solver::SolverError>(())
+    /// ```
     #[must_use]
     pub fn jacobian_triplets(&self) -> Triplets {
         let mut triplets = Vec::new();
@@ -29,6 +45,17 @@ impl System<'_> {
 
     /// The lower triangle of the normal matrix `JᵀJ` (and the Hessians of energies) at the last
     /// linearisation, by position.
+    ///
+    /// # Example
+    /// ```
+    /// use gp_solver::{Closeness, Factorization, Problem, System};
+    /// let mut problem = Problem::new(2);
+    /// problem.add(Closeness::new("target", vec![1.0, 1.0], vec![3.0, 3.0]));
+    /// let mut system = System::new(problem, Factorization::Band)?;
+    /// system.linearize(&[0.0, 0.0])?;
+    /// assert_eq!(system.normal_triplets(), [(0, 0, 9.0), (1, 1, 9.0)]);
+    /// # Ok::<(), gp_solver::SolverError>(())
+    /// ```
     #[must_use]
     pub fn normal_triplets(&self) -> Triplets {
         let (n, matrix) = (self.variables(), self.matrix());

@@ -23,6 +23,22 @@ const ROUNDING: f64 = 1e-12;
 ///
 /// # Errors
 /// [`SolverError`] for what cannot be attempted; not converging is a [`Status`].
+///
+/// # Example
+/// ```
+/// use gp_solver::{Elements, NumericBlock, Options, Problem, solve};
+/// // Where the cosine meets the diagonal.
+/// let mut elements = Elements::new();
+/// elements.push(&[0], 1);
+/// let meet = NumericBlock::new("meet", elements, |_, x, rows| rows[0] = x[0].cos() - x[0]);
+/// let mut problem = Problem::new(1);
+/// problem.add(meet);
+/// let mut x = [1.0];
+/// let report = solve(problem, &mut x, &Options::default())?;
+/// assert!(report.final_energy < 1e-20);
+/// assert!((x[0] - 0.739_085_133_215_160_6).abs() < 1e-9);
+/// # Ok::<(), gp_solver::SolverError>(())
+/// ```
 pub fn solve(
     problem: Problem<'_>,
     x: &mut [f64],
@@ -124,6 +140,7 @@ impl<'a> Run<'a> {
         let (factorizations_before, timings_before) = (system.factorizations(), system.timings());
         system.refresh(x);
         system.keep_scaling(false);
+        system.damp_by_blocks(!keeps_scaling(options));
         system.linearize(x)?;
         system.keep_scaling(keeps_scaling(options));
         let start = start_record(&system);
@@ -151,6 +168,27 @@ impl<'a> Run<'a> {
     ///
     /// # Errors
     /// [`SolverError::ForeignCheckpoint`].
+    ///
+    /// # Example
+    /// ```
+    /// use gp_solver::{Checkpoint, Factorization, Options, Problem, QuadraticBuilder, Run, System};
+    /// let run = || {
+    ///     let mut root = QuadraticBuilder::new("root");
+    ///     root.equation(1.0).product(0, 0, 1.0).constant(-2.0);
+    ///     let mut problem = Problem::new(1);
+    ///     problem.add(root.build());
+    ///     Run::new(System::new(problem, Factorization::Auto)?, &[5.0], &Options::default())
+    /// };
+    /// let mut whole = run()?;
+    /// whole.step(&mut ())?;
+    /// let state = whole.save(Checkpoint::new("solve", 0, 0, 0));
+    /// whole.step(&mut ())?;
+    /// let mut resumed = run()?;
+    /// resumed.resume(&state)?;
+    /// resumed.step(&mut ())?;
+    /// assert_eq!((resumed.x(), resumed.iterations()), (whole.x(), 2)); // to the bit
+    /// # Ok::<(), gp_solver::SolverError>(())
+    /// ```
     pub fn resume(&mut self, checkpoint: &Checkpoint) -> Result<(), SolverError> {
         let x = checkpoint.numbers("x", self.x.len())?;
         let scaling = checkpoint.numbers("scaling", self.system.variables())?;
@@ -196,6 +234,24 @@ impl<'a> Run<'a> {
     ///
     /// # Panics
     /// If the lengths differ.
+    ///
+    /// # Example
+    /// ```
+    /// use gp_solver::{Factorization, Options, Problem, QuadraticBuilder, Run, Stage, System};
+    /// // Both roots of x² = 4, one after the other.
+    /// let mut root = QuadraticBuilder::new("root");
+    /// root.equation(1.0).product(0, 0, 1.0).constant(-4.0);
+    /// let mut problem = Problem::new(1);
+    /// problem.add(root.build());
+    /// let system = System::new(problem, Factorization::Auto)?;
+    /// let mut run = Run::new(system, &[1.0], &Options::default())?;
+    /// run.go_on(&Stage::only("positive"), &mut ())?;
+    /// assert!((run.x()[0] - 2.0).abs() < 1e-9);
+    /// run.set_x(&[-1.0]);
+    /// run.go_on(&Stage::only("negative"), &mut ())?;
+    /// assert!((run.x()[0] + 2.0).abs() < 1e-9);
+    /// # Ok::<(), gp_solver::SolverError>(())
+    /// ```
     pub fn set_x(&mut self, x: &[f64]) {
         self.x.copy_from_slice(x);
         self.is_stale = true;
@@ -245,9 +301,28 @@ impl<'a> Run<'a> {
     }
 
     /// Gives the planned problem and the iterate back.
+    ///
+    /// # Example
+    /// ```
+    /// use gp_solver::{Closeness, Factorization, Options, Problem, Run, Stage, System};
+    /// let mut problem = Problem::new(1);
+    /// let target = problem.add(Closeness::new("target", vec![4.0], vec![1.0]));
+    /// let system = System::new(problem, Factorization::Auto)?;
+    /// let mut run = Run::new(system, &[0.0], &Options::default())?;
+    /// run.go_on(&Stage::only("first"), &mut ())?;
+    /// // The problem again, for another round with a block more.
+    /// let (mut system, x) = run.into_parts();
+    /// system.add(Closeness::new("there", vec![8.0], vec![1.0]))?;
+    /// let mut run = Run::new(system, &x, &Options::default())?;
+    /// run.go_on(&Stage::only("second"), &mut ())?;
+    /// assert!((run.x()[0] - 6.0).abs() < 1e-6);
+    /// assert_eq!(run.system().problem().weight(target)?, 1.0);
+    /// # Ok::<(), gp_solver::SolverError>(())
+    /// ```
     #[must_use]
     pub fn into_parts(mut self) -> (System<'a>, Vec<f64>) {
         self.system.keep_scaling(false);
+        self.system.damp_by_blocks(false);
         (self.system, self.x)
     }
 

@@ -1,9 +1,11 @@
 //! A problem linearised at an iterate, and single steps from it.
 
+use super::finite::{check_finite, half_square, weigh};
 use super::normal::{NormalPlan, Scratch};
+use super::vectors::VectorPlan;
 use crate::block::{Block, ResidualBlock};
 use crate::clock::Instant;
-use crate::error::{Quantity, SolverError};
+use crate::error::SolverError;
 use crate::linear::{Factor, Factorization};
 use crate::problem::{BlockId, Problem, Seen, Slot};
 use crate::report::{Term, Timings};
@@ -21,6 +23,25 @@ struct BlockValues {
 /// problem is linearised and stepped any number of times.
 ///
 /// This is what the solvers stand on; it is public for callers that drive their own iteration.
+///
+/// # Example
+/// ```
+/// use gp_solver::{Factorization, Problem, QuadraticBuilder, System};
+/// // Newton's root of 2: x ← x − (x² − 2) / 2x.
+/// let mut root = QuadraticBuilder::new("root");
+/// root.equation(1.0).product(0, 0, 1.0).constant(-2.0);
+/// let mut problem = Problem::new(1);
+/// problem.add(root.build());
+/// let mut system = System::new(problem, Factorization::Auto)?;
+/// let mut x = [1.0];
+/// for _ in 0..6 {
+///     system.linearize(&x)?;
+///     system.damped_step(0.0)?;
+///     system.stepped_into(&x.clone(), &mut x);
+/// }
+/// assert!((x[0] - 2.0_f64.sqrt()).abs() < 1e-15);
+/// # Ok::<(), gp_solver::SolverError>(())
+/// ```
 pub struct System<'a> {
     problem: Problem<'a>,
     wanted: Factorization,
@@ -36,6 +57,9 @@ pub struct System<'a> {
     /// Scaling `D` of steps: the diagonal, or its running maximum.
     scaling: Vec<f64>,
     keeps_scaling: bool,
+    vectors: VectorPlan,
+    /// Whether `D` has the blocks of the vectors, or the mean of their diagonals.
+    has_blocks: bool,
     terms: Vec<f64>,
     trial: Vec<f64>,
     shift: Vec<f64>,
@@ -93,6 +117,8 @@ impl<'a> System<'a> {
             diagonal: vec![0.0; n],
             scaling: vec![0.0; n],
             keeps_scaling: false,
+            vectors: VectorPlan::new(&problem, &plan, &factor),
+            has_blocks: false,
             terms: vec![0.0; problem.slots.len()],
             trial: vec![0.0; problem.slots.len()],
             shift: vec![0.0; n],
@@ -118,6 +144,17 @@ impl<'a> System<'a> {
     ///
     /// # Errors
     /// What [`SolverError`] says of malformed blocks.
+    ///
+    /// # Example
+    /// ```
+    /// use gp_solver::{Closeness, Factorization, Problem, System};
+    /// let mut system = System::new(Problem::new(1), Factorization::Auto)?;
+    /// let target = system.add(Closeness::new("target", vec![3.0], vec![2.0]))?;
+    /// assert_eq!(system.linearize(&[0.0])?, 18.0); // ½ (2 · 3)²
+    /// system.set_weight(target, 0.5)?;
+    /// assert_eq!(system.linearize(&[0.0])?, 4.5);
+    /// # Ok::<(), gp_solver::SolverError>(())
+    /// ```
     pub fn add(&mut self, block: impl ResidualBlock + 'a) -> Result<BlockId, SolverError> {
         let block = Block::Residual(Box::new(block));
         Seen::new(self.problem.unknowns()).check(&block)?;
@@ -129,6 +166,7 @@ impl<'a> System<'a> {
         let id = self.problem.push(block);
         if !fits {
             (self.plan, self.factor) = NormalPlan::new(&self.problem, self.wanted)?;
+            self.vectors = VectorPlan::new(&self.problem, &self.plan, &self.factor);
             self.matrix = vec![0.0; self.factor.values_len()];
             self.forget_constant();
         }
@@ -239,8 +277,9 @@ impl<'a> System<'a> {
         &self.gradient
     }
 
-    /// Diagonal of the normal matrix at the last linearisation, by position; where it is zero
-    /// the unknown's natural size stands in.
+    /// Diagonal of the normal matrix at the last linearisation, by position, its mean over the
+    /// components of a [vector](crate::Variables::set_vectors); where it is zero the unknown's
+    /// natural size stands in.
     #[must_use]
     pub fn diagonal(&self) -> &[f64] {
         &self.diagonal
@@ -256,6 +295,14 @@ impl<'a> System<'a> {
     /// Makes the scaling the running maximum of the diagonal from here on, or its last value.
     pub(crate) fn keep_scaling(&mut self, keep: bool) {
         self.keeps_scaling = keep;
+    }
+
+    /// Damps a vector by its block of the matrix from the next linearisation on: steps then are as
+    /// free in a direction that the terms leave open, whichever it is, as a coordinate of its own
+    /// would be. Only for scalings that follow the iterate, for the largest of several blocks is no
+    /// block.
+    pub(crate) fn damp_by_blocks(&mut self, blocks: bool) {
+        self.has_blocks = blocks && !self.vectors.is_empty();
     }
 
     /// Takes up a scaling from a checkpoint.
@@ -337,7 +384,7 @@ impl<'a> System<'a> {
                 }
                 Block::Removed => 0.0,
             };
-            check_finite(block, values, self.terms[b])?;
+            check_finite(block, &values.residuals, &values.derivatives, self.terms[b])?;
         }
         self.energy = self.terms.iter().sum();
         self.timings.linearize += begin.elapsed();
@@ -412,8 +459,15 @@ impl<'a> System<'a> {
             let size = self.problem.variables.sizes()[self.plan.variable[i]];
             // Exact Hessians of energies can have negative diagonals.
             self.diagonal[i] = if a != 0.0 { a.abs() } else { 1.0 / (size * size) };
-            let least = if self.keeps_scaling { self.scaling[i] } else { 0.0 };
-            self.scaling[i] = self.diagonal[i].max(least);
+        }
+        if self.has_blocks {
+            self.vectors.take(&self.matrix);
+        } else {
+            self.vectors.average(&mut self.diagonal);
+        }
+        for (scaling, &diagonal) in self.scaling.iter_mut().zip(&self.diagonal) {
+            let least = if self.keeps_scaling { *scaling } else { 0.0 };
+            *scaling = diagonal.max(least);
         }
     }
 
@@ -450,7 +504,7 @@ impl<'a> System<'a> {
         for (s, &d) in self.shift.iter_mut().zip(&self.scaling) {
             *s = damping * d;
         }
-        self.shifted_step()
+        self.shifted_step(damping)
     }
 
     /// The damping that would make the last [damped step](Self::damped_step), taken with
@@ -459,11 +513,15 @@ impl<'a> System<'a> {
     #[must_use]
     pub fn damping_for_radius(&mut self, damping: f64, radius: f64) -> f64 {
         let begin = Instant::now();
-        let mut image: Vec<f64> = self.step.iter().zip(&self.scaling).map(|(s, d)| s * d).collect();
-        let square: f64 = image.iter().zip(&self.step).map(|(a, b)| a * b).sum();
+        let mut scaled: Vec<f64> =
+            self.step.iter().zip(&self.scaling).map(|(s, d)| s * d).collect();
+        if self.has_blocks {
+            self.vectors.add_cross(&self.step, &mut scaled);
+        }
+        let square: f64 = scaled.iter().zip(&self.step).map(|(a, b)| a * b).sum();
+        let mut image = scaled.clone();
         self.factor.solve_in_place(&mut image);
-        let bend: f64 =
-            (self.step.iter().zip(&self.scaling).zip(&image)).map(|((s, d), w)| s * d * w).sum();
+        let bend: f64 = scaled.iter().zip(&image).map(|(d, w)| d * w).sum();
         self.timings.solve += begin.elapsed();
         let norm = square.sqrt();
         (damping + (norm - radius) / radius * square / bend).max(0.0)
@@ -482,13 +540,20 @@ impl<'a> System<'a> {
         for (s, &i) in self.shift.iter_mut().zip(&self.plan.variable) {
             *s = (epsilon / self.problem.variables.sizes()[i]).powi(2);
         }
-        self.shifted_step()
+        self.shifted_step(0.0)
     }
 
-    fn shifted_step(&mut self) -> Result<StepModel, SolverError> {
+    /// The step with the shift on the diagonal and `damping` times the rest of the blocks.
+    fn shifted_step(&mut self, damping: f64) -> Result<StepModel, SolverError> {
         let begin = Instant::now();
         self.factorizations += 1;
+        if self.has_blocks {
+            self.vectors.put(&mut self.matrix, 1.0 + damping);
+        }
         let result = self.factor.factor(&self.matrix, &self.shift);
+        if self.has_blocks {
+            self.vectors.put(&mut self.matrix, 1.0);
+        }
         self.timings.factor += begin.elapsed();
         if let Err(error) = result {
             return Err(match error {
@@ -512,7 +577,12 @@ impl<'a> System<'a> {
             decrease += 0.5 * s * (self.shift[i] * s - self.gradient[i]);
             square += self.scaling[i] * s * s;
         }
-        Ok(StepModel { predicted_decrease: decrease, scaled_norm: square.sqrt() })
+        if self.has_blocks {
+            let cross = self.vectors.cross(&self.step);
+            decrease += 0.5 * damping * cross;
+            square += cross;
+        }
+        Ok(StepModel { predicted_decrease: decrease, scaled_norm: square.max(0.0).sqrt() })
     }
 
     /// `out = x + step`, fixed unknowns unchanged.
@@ -530,18 +600,33 @@ impl<'a> System<'a> {
     #[must_use]
     pub fn scaled_norm(&self, x: &[f64]) -> f64 {
         let term = |(&i, &d): (&usize, &f64)| d * x[i] * x[i];
-        self.plan.variable.iter().zip(&self.scaling).map(term).sum::<f64>().sqrt()
+        let mut square: f64 = self.plan.variable.iter().zip(&self.scaling).map(term).sum();
+        if self.has_blocks {
+            let by_position: Vec<f64> = self.plan.variable.iter().map(|&i| x[i]).collect();
+            square += self.vectors.cross(&by_position);
+        }
+        square.max(0.0).sqrt()
     }
 
-    /// `max_i |g_i| / √(A_ii · 2E)`, 0 where the energy is.
+    /// `max_i |g_i| / √(A_ii · 2E)`, 0 where the energy is. Of a
+    /// [vector](crate::Variables::set_vectors) the length of its gradient and the mean of its
+    /// diagonal count.
     #[must_use]
     pub fn scaled_gradient_norm(&self) -> f64 {
         if self.energy == 0.0 {
             return 0.0;
         }
         let scale = 2.0 * self.energy.abs();
-        let cosine = |(&g, &d): (&f64, &f64)| g.abs() / (d * scale).sqrt();
-        self.gradient.iter().zip(&self.diagonal).map(cosine).fold(0.0, f64::max)
+        if self.vectors.is_empty() {
+            let cosine = |(&g, &d): (&f64, &f64)| g.abs() / (d * scale).sqrt();
+            return self.gradient.iter().zip(&self.diagonal).map(cosine).fold(0.0, f64::max);
+        }
+        let mut squares: Vec<f64> = self.gradient.iter().map(|g| g * g).collect();
+        self.vectors.sum(&mut squares);
+        let mut diagonal = self.diagonal.clone();
+        self.vectors.average(&mut diagonal);
+        let cosine = |(&g, &d): (&f64, &f64)| (g / (d * scale)).sqrt();
+        squares.iter().zip(&diagonal).map(cosine).fold(0.0, f64::max)
     }
 
     pub(super) fn plan(&self) -> &NormalPlan {
@@ -575,72 +660,4 @@ impl<'a> System<'a> {
         let (expected, found) = (self.problem.unknowns(), x.len());
         Err(SolverError::WrongLength { what: "the vector of unknowns", expected, found })
     }
-}
-
-/// `values · weight`, to the bit the same where the weight is 1.
-fn weigh(values: &mut [f64], weight: f64) {
-    if weight != 1.0 {
-        values.iter_mut().for_each(|value| *value *= weight);
-    }
-}
-
-/// `½ Σ r²`.
-fn half_square(residuals: &[f64]) -> f64 {
-    // Eight sums side by side: a fixed order that the compiler can vectorise.
-    let mut sums = [0.0; 8];
-    let chunks = residuals.chunks_exact(8);
-    let rest: f64 = chunks.remainder().iter().map(|r| r * r).sum();
-    for chunk in chunks {
-        for (sum, r) in sums.iter_mut().zip(chunk) {
-            *sum += r * r;
-        }
-    }
-    0.5 * (sums.iter().sum::<f64>() + rest)
-}
-
-/// Whether all values are finite, in one pass without branches: `0 · v` is NaN otherwise.
-fn all_finite(values: &[f64]) -> bool {
-    let mut sums = [0.0; 8];
-    let chunks = values.chunks_exact(8);
-    let rest: f64 = chunks.remainder().iter().map(|v| 0.0 * v).sum();
-    for chunk in chunks {
-        for (sum, v) in sums.iter_mut().zip(chunk) {
-            *sum += 0.0 * v;
-        }
-    }
-    sums.iter().sum::<f64>() + rest == 0.0
-}
-
-fn check_finite(block: &Block<'_>, values: &BlockValues, energy: f64) -> Result<(), SolverError> {
-    if energy.is_finite() && all_finite(&values.residuals) && all_finite(&values.derivatives) {
-        return Ok(());
-    }
-    let elements = block.elements();
-    let is_rows = matches!(block, Block::Residual(_));
-    let fault = |row: usize, quantity: Quantity, value: f64| {
-        Err(SolverError::NotFinite { block: block.name().to_owned(), row, quantity, value })
-    };
-    for e in 0..elements.len() {
-        let columns = elements.columns(e);
-        for (r, row) in elements.rows(e).enumerate() {
-            let value = values.residuals[row];
-            if !value.is_finite() {
-                let quantity = if is_rows { Quantity::Residual } else { Quantity::Gradient };
-                return fault(row, quantity, value);
-            }
-            let begin = elements.jacobian_range(e).start + r * columns.len();
-            for (k, &column) in columns.iter().enumerate() {
-                let value = values.derivatives[begin + k];
-                if !value.is_finite() {
-                    let quantity =
-                        if is_rows { Quantity::Derivative(column) } else { Quantity::Hessian };
-                    return fault(row, quantity, value);
-                }
-            }
-        }
-    }
-    // Finite rows whose squares overflow.
-    let value = |row: &usize| values.residuals[*row].abs();
-    let row = (0..values.residuals.len()).max_by(|a, b| value(a).total_cmp(&value(b)));
-    fault(row.unwrap_or(0), Quantity::Energy, energy)
 }

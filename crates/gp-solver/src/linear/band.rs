@@ -78,6 +78,14 @@ impl BandCholesky {
     }
 
     /// Where entry `(i, j)`, `i ≥ j`, stands: at `j · half_bandwidth + i`.
+    ///
+    /// # Example
+    /// ```
+    /// let band = gp_solver::BandCholesky::new(3, 1);
+    /// // Column by column: the diagonal, and what is below it.
+    /// let slots = [(0, 0), (1, 0), (1, 1), (2, 1), (2, 2)].map(|(i, j)| band.slot(i, j));
+    /// assert_eq!(slots, [0, 1, 2, 3, 4]);
+    /// ```
     #[must_use]
     pub fn slot(&self, i: usize, j: usize) -> usize {
         j * self.half_bandwidth + i

@@ -185,6 +185,19 @@ impl Factor {
         }
     }
 
+    /// Where the entry of two coupled positions stands, in either order; none if the structure has no
+    /// place for it.
+    pub(crate) fn slot(&self, a: usize, b: usize) -> Option<usize> {
+        let (i, j) = (a.max(b), a.min(b));
+        match self {
+            Self::Band(band) => (i - j <= band.half_bandwidth()).then(|| band.slot(i, j)),
+            #[cfg(feature = "sparse")]
+            Self::Sparse { cholesky, .. } => cholesky.pattern().slot(i, j),
+            #[cfg(feature = "sparse")]
+            Self::Dissected { cholesky, .. } => cholesky.pattern().slot(i, j),
+        }
+    }
+
     /// Factors `A + diag(shift)`.
     pub(crate) fn factor(&mut self, values: &[f64], shift: &[f64]) -> Result<(), SolverError> {
         match self {

@@ -4,6 +4,19 @@ use crate::error::SolverError;
 
 /// Lower triangle of a symmetric pattern, compressed by columns: the rows of a column are sorted
 /// and start with the diagonal, which is always there (kept by `new`).
+///
+/// # Example
+/// ```
+/// use gp_solver::{SolverError, SymmetricPattern};
+/// // Second differences on three points.
+/// let pattern = SymmetricPattern::new(3, [(0, 1), (2, 1)])?;
+/// assert_eq!(pattern.column_starts(), [0, 2, 4, 5]);
+/// assert_eq!(pattern.rows(), [0, 1, 1, 2, 2]);
+/// let mut image = [0.0; 3];
+/// pattern.multiply(&[2.0, -1.0, 2.0, -1.0, 2.0], &[1.0, 1.0, 1.0], &mut image);
+/// assert_eq!(image, [1.0, 0.0, 1.0]);
+/// # Ok::<(), SolverError>(())
+/// ```
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct SymmetricPattern {
     column_starts: Vec<usize>,
@@ -49,6 +62,15 @@ impl SymmetricPattern {
     ///
     /// # Panics
     /// If a group is not sorted or names a row out of range.
+    ///
+    /// # Example
+    /// ```
+    /// use gp_solver::SymmetricPattern;
+    /// // Two triangles with a common edge 1–2 couple all pairs but 0 and 3.
+    /// let pattern = SymmetricPattern::from_cliques(4, [[0_u32, 1, 2], [1, 2, 3]].iter());
+    /// assert_eq!((pattern.len(), pattern.slot(0, 3)), (4 + 5, None));
+    /// assert_eq!(pattern.slot(0, 2), pattern.slot(2, 0));
+    /// ```
     pub fn from_cliques<G: AsRef<[u32]>>(size: usize, groups: impl Iterator<Item = G>) -> Self {
         let mut columns: Vec<Vec<u32>> = (0..size as u32).map(|j| vec![j]).collect();
         for group in groups {
@@ -105,6 +127,15 @@ impl SymmetricPattern {
     }
 
     /// Where the value of entry `(row, column)` or its mirror image stands.
+    ///
+    /// # Example
+    /// ```
+    /// use gp_solver::SymmetricPattern;
+    /// let pattern = SymmetricPattern::new(3, [(1, 0)])?;
+    /// assert_eq!(pattern.slot(0, 1), pattern.slot(1, 0));
+    /// assert_eq!(pattern.slot(0, 2), None);
+    /// # Ok::<(), gp_solver::SolverError>(())
+    /// ```
     #[must_use]
     pub fn slot(&self, row: usize, column: usize) -> Option<usize> {
         let (i, j) = (row.max(column), row.min(column));

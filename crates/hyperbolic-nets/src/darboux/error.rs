@@ -1,6 +1,14 @@
 //! What has no Darboux transform.
 
 /// Why a point or a net cannot be transformed.
+///
+/// # Example
+/// ```
+/// use hyperbolic_nets::darboux::{DarbouxMap, Error};
+/// let error = DarbouxMap::new(1.0).unwrap_err();
+/// assert_eq!(error, Error::BadCentre { c: 1.0 });
+/// assert!(error.to_string().ends_with("choose c finite and different from 1"));
+/// ```
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 #[expect(missing_docs, reason = "the messages spell out every field")]

@@ -67,6 +67,18 @@ options! {
     ///
     /// With `c`, coordinates are counted from the middle of the net's bounding box in lengths of its
     /// diagonal. With corners, those of that box, enlarged by 5 % of the diagonal, move.
+    ///
+    /// # Example
+    /// ```
+    /// use geom_core::DVec3;
+    /// use hyperbolic_nets::darboux::{Corner, Options};
+    /// // One corner of the cage is pulled; the others stay.
+    /// let pulled = Corner { index: 7, point: DVec3::new(1.2, 1.1, 0.9) };
+    /// let options = Options { corners: vec![pulled].into(), ..Options::default() };
+    /// assert!(options.check().is_ok());
+    /// // A centre as well would be two transformations at once.
+    /// assert!(Options { c: Some(-0.6), ..options }.check().is_err());
+    /// ```
     #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
     #[serde(default, deny_unknown_fields)]
     pub struct Options {

@@ -80,7 +80,10 @@ impl<'i> Joint<'i> {
             Some(weight) => format!("weight {weight}"),
             None => POLISH.to_owned(),
         };
-        Stage::new(name, number, self.last() + 1)
+        let stage = Stage::new(name, number, self.last() + 1);
+        self.input
+            .place()
+            .map_or(stage.clone(), |place| stage.at(place.center().to_array(), place.scale()))
     }
 
     fn first_x(&self) -> Vec<f64> {

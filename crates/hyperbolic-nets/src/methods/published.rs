@@ -50,7 +50,12 @@ impl<'i> Published<'i> {
             0 => "planar stars".to_owned(),
             _ => format!("round {round}"),
         };
-        Stage::new(name, round, self.options.rounds + 1).at([0.0; 3], 1.0 / self.h)
+        let stage = Stage::new(name, round, self.options.rounds + 1);
+        let (center, scale) = self
+            .input
+            .place()
+            .map_or(([0.0; 3], 1.0), |place| (place.center().to_array(), place.scale()));
+        stage.at(center, scale / self.h)
     }
 
     fn first_x(&self) -> Vec<f64> {

@@ -11,6 +11,20 @@ use rayon::prelude::*;
 pub const KINK_SAMPLES: usize = 11;
 
 /// Quads with one rational bilinear patch each.
+///
+/// # Example
+/// ```
+/// use geom_core::{DVec3, PolyMesh};
+/// use hyperbolic_nets::{HyperbolicNet, QuadNet};
+/// // Two quads of z = xy: with equal weights their patches are pieces of that surface.
+/// let points = [(0, 0), (1, 0), (2, 0), (0, 1), (1, 1), (2, 1)];
+/// let points = points.map(|(x, y)| (f64::from(x), f64::from(y)));
+/// let points = points.iter().map(|(x, y)| DVec3::new(*x, *y, x * y)).collect();
+/// let net = QuadNet::new(&PolyMesh::new(points, &[[0, 1, 4, 3], [1, 2, 5, 4]])?)?;
+/// let surface = HyperbolicNet::new(net, None, vec![1.0, 1.0])?;
+/// assert!(surface.kinks().iter().all(|kink| *kink < 1e-7));
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Clone, Debug)]
 pub struct HyperbolicNet {
     net: QuadNet,

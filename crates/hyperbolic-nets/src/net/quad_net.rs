@@ -43,6 +43,20 @@ pub struct InnerEdge {
 /// net, whatever its topology: families never swap along a loop, and reversing both directions
 /// keeps the diagonal. Shape parameters belong to that diagonal. Interior valences are even,
 /// every vertex has a face.
+///
+/// # Example
+/// ```
+/// use geom_core::{DVec3, PolyMesh};
+/// use hyperbolic_nets::QuadNet;
+/// // Four quads on z = xy around a vertex of valence four.
+/// let at = |k: u32| (f64::from(k / 3) - 1.0, f64::from(k % 3) - 1.0);
+/// let points = (0..9).map(at).map(|(x, y)| DVec3::new(x, y, x * y)).collect();
+/// let mesh = PolyMesh::new(points, &[[0, 3, 4, 1], [1, 4, 5, 2], [3, 6, 7, 4], [4, 7, 8, 5]])?;
+/// let net = QuadNet::new(&mesh)?;
+/// assert_eq!((net.edges().len(), net.inner_edges().len()), (12, 4));
+/// assert_eq!(net.boundary().iter().filter(|is_boundary| !**is_boundary).count(), 1);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Clone, Debug)]
 pub struct QuadNet {
     mesh: PolyMesh,

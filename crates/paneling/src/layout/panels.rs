@@ -8,6 +8,7 @@ use geom_core::{BoundingBox, SurfaceJet, principal_curvatures};
 use glam::{DMat3, DVec3};
 use rayon::prelude::*;
 use std::collections::HashMap;
+use std::sync::Arc;
 
 /// Points at which a seam is measured, both ends included.
 pub const SEAM_SAMPLES: usize = 5;
@@ -59,6 +60,17 @@ pub(crate) struct Samples {
 }
 
 /// The panels of a surface, ready to be fitted.
+///
+/// # Example
+/// ```
+/// use paneling::{Layout, PanelSet, Pattern};
+/// let surface = fixtures::surfaces::Shape::Saddle.surface(8, 8, 4, 4);
+/// let layout = Layout::generate(Pattern::Quad, 4, 3, [false, false])?;
+/// let panels = PanelSet::new(&surface, &layout)?;
+/// // Between four by three panels there are 3 · 3 + 4 · 2 seams.
+/// assert_eq!((panels.len(), panels.seams().len()), (12, 17));
+/// # Ok::<(), paneling::Error>(())
+/// ```
 #[derive(Clone, Debug)]
 pub struct PanelSet {
     /// Samples of panel `p` are `starts[p]..starts[p + 1]`: along the border, halfway in, middle.
@@ -75,12 +87,15 @@ pub struct PanelSet {
     pub(crate) curvatures: Vec<[f64; 2]>,
     /// Typical distance of a sample from the middle of its panel, in model units.
     pub(crate) size: f64,
-    /// Diagonal of the bounding box of all samples, in model units.
+    /// Size of the design and diagonal of the bounding box of all samples, in model units.
+    pub(crate) extent: f64,
     pub(crate) diagonal: f64,
     /// Places of the panels' middles in the domain.
     pub(crate) middles: Vec<[f64; 2]>,
     /// Corners of the panels in the domain.
     pub(crate) corners: Vec<Vec<[f64; 2]>>,
+    /// The same panels at the origin, where they were cut, and where that is in the model.
+    pub(crate) at_origin: Option<(Arc<PanelSet>, DVec3)>,
 }
 
 /// An edge of the layout, as its first panel sees it.
@@ -94,8 +109,30 @@ impl PanelSet {
     /// Samples the panels of `layout` on `surface`.
     ///
     /// # Errors
-    /// [`Error::Singular`] where the surface has no normal.
+    /// [`Error::Singular`] where the surface has no normal, [`Error::Size`] for one without extent.
     pub fn new(surface: &BsplineSurface, layout: &Layout) -> Result<Self, Error> {
+        let (centred, center) = Self::centred(surface, layout)?;
+        Ok(centred.placed(center))
+    }
+
+    /// The panels back where they stand in the model.
+    pub(crate) fn placed(self, center: DVec3) -> Self {
+        let at_origin = Some((Arc::new(self.clone()), center));
+        Self { at_origin, ..self.translated(center) }
+    }
+
+    /// The panels moved to the origin, and by what they have been moved away from.
+    pub(crate) fn centred(
+        surface: &BsplineSurface,
+        layout: &Layout,
+    ) -> Result<(Self, DVec3), Error> {
+        let place = surface.normalization()?;
+        let centred = Self::cut(&surface.translated(-place.center()), place.size(), layout)?;
+        Ok((centred, place.center()))
+    }
+
+    /// The panels of a surface of the size `extent`.
+    fn cut(surface: &BsplineSurface, extent: f64, layout: &Layout) -> Result<Self, Error> {
         let (edges, uses) = edges_of(layout.panels());
         let (start_u, end_u) = surface.knots_u().domain();
         let (start_v, end_v) = surface.knots_v().domain();
@@ -177,9 +214,11 @@ impl PanelSet {
             frames,
             curvatures,
             size,
+            extent,
             diagonal,
             middles,
             corners,
+            at_origin: None,
         })
     }
 
@@ -195,8 +234,16 @@ impl PanelSet {
             *k /= factor * factor;
         }
         scaled.size *= factor;
+        scaled.extent *= factor;
         scaled.diagonal *= factor;
         scaled
+    }
+
+    /// The same panels somewhere else.
+    pub(crate) fn translated(mut self, by: DVec3) -> Self {
+        self.samples.points.iter_mut().chain(&mut self.edges.points).for_each(|p| *p += by);
+        self.frames.iter_mut().for_each(|f| f.origin += by);
+        self
     }
 
     /// Number of panels.
@@ -229,10 +276,10 @@ impl PanelSet {
         self.diagonal
     }
 
-    /// A length in percent of the diagonal of the bounding box.
+    /// Size of the design: diameter of the smallest ball around its check grid.
     #[must_use]
-    pub fn percent_of_diagonal(&self, length: f64) -> f64 {
-        100.0 * length / self.diagonal
+    pub fn extent(&self) -> f64 {
+        self.extent
     }
 
     /// The middle of each panel in the domain of the surface.

@@ -54,11 +54,12 @@ pub(crate) fn residual_scale(start: &[Sample], curvature: f64) -> f64 {
     mean.sqrt().max(SCALE_FLOOR * curvature.powi(5))
 }
 
-/// One value per sample to padded rows.
+/// One value per sample that counts to padded rows.
 pub(crate) fn padded(grid: &SampleGrid, values: impl Iterator<Item = f64>) -> Vec<f64> {
     let (m_v, stride) = (grid.v.len(), grid.stride());
     let mut rows = vec![0.0; grid.u.len() * stride];
-    for (s, value) in values.enumerate() {
+    for (k, value) in values.enumerate() {
+        let s = grid.place(k);
         rows[s / m_v * stride + s % m_v] = value;
     }
     rows

@@ -56,7 +56,8 @@ impl RelationRows {
     fn set_coefficients(&mut self, samples: &[Sample]) {
         let (m_v, stride) = (self.grid.v.len(), self.grid.stride());
         let rows = self.target.rows(samples);
-        for (s, row) in rows.iter().enumerate() {
+        for (k, row) in rows.iter().enumerate() {
+            let s = self.grid.place(k);
             for (which, value) in row.iter().enumerate() {
                 let slot = (3 * (s / m_v) + which) * stride + s % m_v;
                 self.coefficients[slot] = self.weight * value;

@@ -65,6 +65,10 @@ pub(crate) fn fill<const N: usize>(
         gradient.resize(if jacobian.is_some() { 3 * N * stride } else { 0 }, 0.0);
         for i in run.clone() {
             term.row(grid, i, &unrolled, scratch, RowValues { residual, gradient });
+            for &j in grid.others(i) {
+                residual[j] = 0.0;
+                gradient.iter_mut().skip(j).step_by(stride).for_each(|value| *value = 0.0);
+            }
             // Elements of this knot span row follow one another, each with rows i-major.
             let mut first = 0;
             for run_v in &grid.v.runs {

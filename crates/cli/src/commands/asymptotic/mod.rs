@@ -3,15 +3,18 @@
 mod lamellas;
 mod page;
 
-use crate::args::{ConfigArgs, OutputArgs, ReportArgs, check_output_folder};
+use crate::args::{ConfigArgs, EndingArgs, OutputArgs, ReportArgs, check_output_folder};
+use crate::checkpoints::CheckpointArgs;
 use crate::context::Context;
 use crate::failure::Failure;
+use crate::input_file::PartArgs;
 use crate::option_flags::{OptionFlags, in_flags};
 use crate::outcome::{Outcome, Status};
 use crate::watch::Watch;
 use asymptotic_bezier::{DataFile, Error, Input, Options, Solution, solve};
 use bspline::{BsplineSurface, Degree, KnotVector};
 use exchange::{LengthUnit, Mesh, Model, NamedSurface};
+use gp_solver::SolverError;
 use std::path::{Path, PathBuf};
 
 /// Arguments of `asymptotic`.
@@ -24,6 +27,8 @@ pub(crate) struct Asymptotic {
     /// asymptotic quad mesh or the net file of `umbilic hnet`
     data: PathBuf,
     #[command(flatten)]
+    part: PartArgs,
+    #[command(flatten)]
     output: OutputArgs,
     #[command(flatten)]
     options: OptionFlags<Options>,
@@ -33,6 +38,10 @@ pub(crate) struct Asymptotic {
     lamellas: Option<PathBuf>,
     #[command(flatten)]
     config: ConfigArgs,
+    #[command(flatten)]
+    checkpoint: CheckpointArgs,
+    #[command(flatten)]
+    ending: EndingArgs,
     #[command(flatten)]
     report: ReportArgs,
 }
@@ -50,12 +59,16 @@ impl Asymptotic {
         }
         let said = |e: &dyn std::fmt::Display| in_flags::<Options>(&e.to_string());
         options.check().map_err(|e| self.options.refused(&self.config, e))?;
-        let (input, unit) = read_input(&self.data, &options)?;
-        let mut watch = Watch::new(context, "solving");
+        let mut watch =
+            Watch::new(context, "solving").of(&self.data).with_checkpoints(&self.checkpoint)?;
+        let (input, unit) = read_input(context, &self.data, &self.part, &options)?;
         let result = match solve(&input, &options, &mut watch) {
             Ok(result) => result,
             Err(Error::Interrupted { .. }) => {
                 return Ok(Outcome::new(Status::Interrupted, 0).with_input(&self.data));
+            }
+            Err(Error::Solver(e @ SolverError::ForeignCheckpoint { .. })) => {
+                return Err(watch.foreign(&e));
             }
             Err(error) => return Err(Failure::input(&self.data, said(&error))),
         };
@@ -63,17 +76,19 @@ impl Asymptotic {
         let mut outcome = Outcome::new(result.report.status, iterations)
             .with_input(&self.data)
             .with_metrics(&result.metrics)?;
+        self.ending.apply(&mut outcome);
+        outcome.summary = summary(&result, &unit);
+        outcome.warnings = result.warnings.iter().map(|w| said(w)).collect();
+        if !watch.finish(&mut outcome) {
+            return Ok(outcome);
+        }
         for path in self.output.output {
             let model = model_for(&path, &result, &unit)?;
-            let bytes =
-                exchange::encode_model(&path, &model).map_err(|e| Failure::input(&path, e))?;
-            outcome.files.push((path, bytes));
+            outcome.add_model(path, &model)?;
         }
         if let Some(folder) = &self.lamellas {
             outcome.files.extend(lamellas::files(folder, &result, &options, &unit));
         }
-        outcome.summary = summary(&result, &unit);
-        outcome.warnings = result.warnings.iter().map(|w| said(w)).collect();
         if self.report.wanted() {
             page::add(&mut outcome, &self.report, context, &result, unit)?;
         }
@@ -81,21 +96,31 @@ impl Asymptotic {
     }
 }
 
-fn read_input(path: &Path, options: &Options) -> Result<(Input, LengthUnit), Failure> {
+fn read_input(
+    context: &Context,
+    path: &Path,
+    part: &PartArgs,
+    options: &Options,
+) -> Result<(Input, LengthUnit), Failure> {
     let refused = |e: &dyn std::fmt::Display| Failure::input(path, e);
+    let is_mesh = options.from_net && exchange::extension_of(path) != "ron";
+    if !part.part.is_empty() && !is_mesh {
+        return Err(Failure::usage("--part chooses from a mesh; leave it out"));
+    }
     if options.from_net {
         let (mesh, unit) = if exchange::extension_of(path) == "ron" {
             let text = exchange::read_text(path).map_err(|e| refused(&e))?;
             let net = exchange::read_net(&text).map_err(|e| refused(&e))?;
             (net.to_poly_mesh().map_err(|e| refused(&e))?, LengthUnit::default())
         } else {
-            let (mesh, unit, _) = crate::net_files::read_mesh(path)?;
+            let (mesh, unit, _) = crate::net_files::read_mesh(Some(context), path, part)?;
             (mesh, unit)
         };
         return Ok((mesh.into(), unit));
     }
-    if exchange::extension_of(path) == "obj" {
-        let model = exchange::read_model(path).map_err(|e| refused(&e))?;
+    if has_polylines(path) {
+        let format = context.input_format.as_deref();
+        let model = exchange::read_model_as(path, format).map_err(|e| refused(&e))?;
         let lines = model.meshes.iter().flat_map(|m| (0..m.lines.len()).map(|k| m.polyline(k)));
         let polylines: Vec<Vec<geom_core::DVec3>> = lines.map(Iterator::collect).collect();
         if polylines.is_empty() {
@@ -112,6 +137,11 @@ fn read_input(path: &Path, options: &Options) -> Result<(Input, LengthUnit), Fai
     Ok((file.input().map_err(|e| refused(&e))?, unit))
 }
 
+/// Whether the format of a file has polylines.
+fn has_polylines(path: &Path) -> bool {
+    matches!(exchange::extension_of(path).as_str(), "obj" | "3dm")
+}
+
 /// The patches as clamped B-splines of one span.
 fn surfaces(result: &Solution) -> Result<Vec<NamedSurface>, Failure> {
     let mut surfaces = Vec::with_capacity(result.result.patches.len());
@@ -122,7 +152,7 @@ fn surfaces(result: &Solution) -> Result<Vec<NamedSurface>, Failure> {
             KnotVector::clamped_uniform(degree, patch.degree() + 1).map_err(Failure::other)?;
         let surface = BsplineSurface::new(knots.clone(), knots, patch.points().to_vec(), None)
             .map_err(Failure::other)?;
-        surfaces.push(NamedSurface { name: format!("patch {f}"), surface });
+        surfaces.push(NamedSurface::new(format!("patch {f}"), surface));
     }
     Ok(surfaces)
 }
@@ -130,7 +160,7 @@ fn surfaces(result: &Solution) -> Result<Vec<NamedSurface>, Failure> {
 /// Surfaces for every format, and the curves as polylines where the format has them.
 fn model_for(path: &Path, result: &Solution, unit: &LengthUnit) -> Result<Model, Failure> {
     let mut model = Model { unit: unit.clone(), surfaces: surfaces(result)?, ..Model::default() };
-    if exchange::extension_of(path) == "obj" {
+    if has_polylines(path) {
         model.meshes.push(curves_mesh(result));
     }
     Ok(model)
