@@ -108,6 +108,7 @@ fn run(
         command: command.name(),
         begin,
         threads: context.threads,
+        choice: paths.choice.clone(),
         metrics: global.metrics.clone(),
         quiet: global.quiet,
     });

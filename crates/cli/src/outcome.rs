@@ -1,7 +1,7 @@
 //! What a command hands back: files still in memory, numbers, and a summary.
 
 use crate::failure::Failure;
-use crate::paths::{STDOUT, twice};
+use crate::paths::{Choice, STDOUT, twice};
 use crate::stdout;
 use exchange::Model;
 use serde::Serialize;
@@ -82,7 +82,13 @@ impl Outcome {
     }
 
     /// The bytes of the metrics file.
-    pub(crate) fn metrics_file(&self, command: &str, seconds: f64, threads: usize) -> Vec<u8> {
+    pub(crate) fn metrics_file(
+        &self,
+        command: &str,
+        seconds: f64,
+        threads: usize,
+        choice: &Choice,
+    ) -> Vec<u8> {
         let file = MetricsFile {
             schema: 1,
             command,
@@ -90,6 +96,7 @@ impl Outcome {
             iterations: self.iterations,
             seconds,
             threads,
+            choice,
             input: self.input.as_deref().map(|p| p.display().to_string()),
             outputs: self.written().map(|(path, _)| path.display().to_string()).collect(),
             metrics: &self.metrics,
@@ -145,6 +152,8 @@ struct MetricsFile<'a> {
     iterations: usize,
     seconds: f64,
     threads: usize,
+    #[serde(flatten)]
+    choice: &'a Choice,
     input: Option<String>,
     outputs: Vec<String>,
     metrics: &'a serde_json::Value,

@@ -6,6 +6,7 @@
 use crate::failure::Failure;
 use crate::outcome::Outcome;
 use clap::{ArgMatches, Command};
+use serde::{Deserialize, Serialize};
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
@@ -22,9 +23,22 @@ pub(crate) const STDOUT: &str = "-";
 /// An argument and the file it names.
 type Named = (String, PathBuf);
 
+/// What was taken of the input, as the user said it; absent where nothing was.
+#[derive(Clone, Debug, Default, Deserialize, Serialize)]
+#[serde(default)]
+pub(crate) struct Choice {
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub(crate) surface: Vec<String>,
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub(crate) part: Vec<String>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(crate) input_format: Option<String>,
+}
+
 /// The files and folders of one command line.
 #[derive(Debug, Default)]
 pub(crate) struct Paths {
+    pub(crate) choice: Choice,
     inputs: Vec<Named>,
     outputs: Vec<Named>,
     folders: Vec<PathBuf>,
@@ -43,6 +57,12 @@ impl Paths {
             for id in all.collect::<BTreeSet<_>>() {
                 paths.add(id, matches);
             }
+            let said = |id: &str| -> Vec<String> {
+                let values = matches.try_get_raw(id).ok().flatten().into_iter().flatten();
+                values.map(|value| value.to_string_lossy().into_owned()).collect()
+            };
+            let input_format = said("input_format").pop();
+            paths.choice = Choice { surface: said("surface"), part: said("part"), input_format };
         }
         paths
     }

@@ -1,8 +1,9 @@
 //! What written files hold, as plain numbers for checking them.
 
 use crate::failure::Failure;
+use crate::paths::Choice;
 use bspline::{BsplineSurface, KnotVector};
-use exchange::{Model, Net};
+use exchange::{Model, Net, Pick};
 use geom_core::DVec3;
 use paneling::{MoldType, PanelRow};
 use serde::Deserialize;
@@ -55,16 +56,25 @@ pub(crate) fn read(command: &str, path: &Path) -> Result<Content, Failure> {
     }
 }
 
-/// Reads what a run was given: a model, or the net file of `hnet`.
-pub(crate) fn read_input(path: &Path) -> Result<Content, Failure> {
-    read_model(path).or_else(|failure| {
+/// Reads what a run was given: a model, as far as it was chosen, or the net file of `hnet`.
+pub(crate) fn read_input(path: &Path, choice: &Choice) -> Result<Content, Failure> {
+    read_chosen(path, choice).or_else(|failure| {
         let is_ron = exchange::extension_of(path) == "ron";
         if is_ron { read_net(path).map_err(|_| failure) } else { Err(failure) }
     })
 }
 
 fn read_model(path: &Path) -> Result<Content, Failure> {
-    let model = exchange::read_model(path).map_err(|e| Failure::input(path, e))?;
+    read_chosen(path, &Choice::default())
+}
+
+fn read_chosen(path: &Path, choice: &Choice) -> Result<Content, Failure> {
+    let refused = |e: &dyn std::fmt::Display| Failure::input(path, e);
+    let format = choice.input_format.as_deref();
+    let mut model = exchange::read_model_as(path, format).map_err(|e| refused(&e))?;
+    // A choice is any text: what is no number and not `all` is a name.
+    let picks = |list: &[String]| list.iter().filter_map(|p| p.parse().ok()).collect::<Vec<Pick>>();
+    model.select(&picks(&choice.surface), &picks(&choice.part)).map_err(|e| refused(&e))?;
     let extension = exchange::extension_of(path);
     let mut content = of_model(&model).map_err(|e| Failure::input(path, e))?;
     content.is_single = matches!(extension.as_str(), "glb" | "stl");
@@ -91,6 +101,7 @@ pub(crate) fn of_model(model: &Model) -> Result<Content, verify::SplineError> {
     Ok(Content {
         surfaces: surfaces.collect::<Result<_, _>>()?,
         meshes: grids.chain(meshes).collect(),
+        is_trimmed: model.surfaces.iter().any(|s| s.trim.is_some()),
         ..Content::default()
     })
 }

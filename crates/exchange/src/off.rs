@@ -130,8 +130,7 @@ mod tests {
         assert_eq!(mesh.positions[4], DVec3::new(0.5, 2.0, 1.0));
         assert_eq!(mesh.faces.iter().collect::<Vec<_>>(), [&[0, 1, 2, 3][..], &[3, 2, 4]]);
         assert!(read_off("OFF 1 0 0\n1 2 3\n").is_ok());
-        let (over_lines, _) =
-            read_off("OFF\n3 1 0\n0\n0 0\n1 0 0\n0 1\n0\n3 0\n1\n2\n").unwrap();
+        let (over_lines, _) = read_off("OFF\n3 1 0\n0\n0 0\n1 0 0\n0 1\n0\n3 0\n1\n2\n").unwrap();
         assert_eq!(over_lines.positions[2], DVec3::Y);
         assert_eq!(over_lines.faces.get(0), [0, 1, 2]);
     }

@@ -50,11 +50,8 @@ pub(crate) fn recompute(surfaces: &[Spline], values: &mut Values) {
         values.number(&format!("{name}_max"), range[1]);
         values.number(&format!("{name}_mean_abs"), sum / area);
     }
-    for (end, p) in [low, high].into_iter().enumerate() {
-        for (k, x) in p.to_array().into_iter().enumerate() {
-            values.number(&format!("bounding_box.{end}.{k}"), x);
-        }
-    }
+    values.place("bounding_box.0", low);
+    values.place("bounding_box.1", high);
 }
 
 fn cells(breaks: &[f64]) -> Vec<f64> {

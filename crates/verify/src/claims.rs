@@ -1,6 +1,7 @@
 //! What a metrics file claims, what the files give, and whether the two agree.
 
-use crate::table::Row;
+use crate::table::{Row, Scale};
+use glam::DVec3;
 use serde_json::Value;
 use std::collections::BTreeMap;
 
@@ -67,9 +68,22 @@ fn collect(value: &Value, key: &str, out: &mut Vec<(String, f64)>) {
 pub struct Values {
     numbers: BTreeMap<String, f64>,
     prefix: String,
+    center: DVec3,
 }
 
 impl Values {
+    /// Of content that was moved to the origin from `center`.
+    pub(crate) fn around(center: DVec3) -> Self {
+        Self { center, ..Self::default() }
+    }
+
+    /// A place in space, one number to a coordinate.
+    pub(crate) fn place(&mut self, key: &str, point: DVec3) {
+        for (k, x) in (point + self.center).to_array().into_iter().enumerate() {
+            self.number(&format!("{key}.{k}"), x);
+        }
+    }
+
     /// A number.
     pub(crate) fn number(&mut self, key: &str, value: f64) {
         self.numbers.insert(format!("{}{key}", self.prefix), value);
@@ -119,19 +133,19 @@ pub struct Finding {
 }
 
 impl Finding {
-    /// Compares a claim with what a file of this size gives.
+    /// Compares a claim with what a file of this scale gives.
     pub(crate) fn new(
         (key, claimed): (String, f64),
         row: Option<&Row>,
         values: &Values,
-        (size, is_single): (f64, bool),
+        (scale, is_single): (&Scale, bool),
     ) -> Self {
         let accuracy = row.and_then(|row| if is_single { row.single } else { Some(row.double) });
         let (Some(recomputed), Some(accuracy)) = (values.get(&key), accuracy) else {
             let verdict = Verdict::NotCheckable;
             return Self { key, claimed, recomputed: None, accuracy: 0.0, verdict };
         };
-        let accuracy = accuracy.of(claimed, size);
+        let accuracy = accuracy.of(claimed, scale);
         // A NaN differs.
         let is_same = (claimed - recomputed).abs() <= accuracy;
         let verdict = if is_same { Verdict::Same } else { Verdict::Differs };

@@ -1,5 +1,6 @@
 //! What a file holds, as plain numbers.
 
+use crate::ball::Ball;
 use crate::mold::Mold;
 use crate::spline::Spline;
 use glam::DVec3;
@@ -20,6 +21,8 @@ pub struct Content {
     pub molds: Vec<Mold>,
     /// Whether the numbers of the file have 24 bits only.
     pub is_single: bool,
+    /// Whether only parts of its surfaces count.
+    pub is_trimmed: bool,
 }
 
 /// Points and faces.
@@ -55,10 +58,30 @@ impl Content {
         nets.chain(self.meshes.iter().flat_map(|m| m.positions.iter().copied()))
     }
 
-    /// The diagonal of the box around all points; 1 without any.
+    /// The diameter of the smallest ball around all points, 1 without any, and its centre.
     #[must_use]
-    pub fn size(&self) -> f64 {
-        diagonal(self.points()).filter(|d| *d > 0.0).unwrap_or(1.0)
+    pub fn extent(&self) -> (f64, DVec3) {
+        let panels = self.panels.iter().map(|p| p.origin);
+        match Ball::around(self.points().chain(panels)) {
+            Some(ball) if ball.radius > 0.0 => (2.0 * ball.radius, ball.center),
+            Some(ball) => (1.0, ball.center),
+            None => (1.0, DVec3::ZERO),
+        }
+    }
+
+    /// The same moved by a vector.
+    #[must_use]
+    pub fn moved(&self, by: DVec3) -> Self {
+        let mut moved = self.clone();
+        moved.surfaces.iter_mut().for_each(|s| *s = s.moved(by));
+        moved.meshes.iter_mut().flat_map(|m| &mut m.positions).for_each(|p| *p += by);
+        moved.panels.iter_mut().for_each(|p| p.origin += by);
+        moved
+    }
+
+    /// The largest number of control points in a direction, at least one.
+    pub(crate) fn most_in_a_direction(&self) -> usize {
+        self.surfaces.iter().flat_map(Spline::counts).fold(1, usize::max)
     }
 
     /// The one mesh with faces.

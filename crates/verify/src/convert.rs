@@ -22,7 +22,7 @@ pub(crate) fn recompute(content: &Content, values: &mut Values) {
     });
     let vertices = content.meshes.iter().flat_map(|m| m.positions.iter().copied());
     let centre = if has_surfaces { centroid(nets) } else { centroid(vertices) };
-    for (k, x) in centre.into_iter().flat_map(|c| c.to_array()).enumerate() {
-        values.number(&format!("centroid.{k}"), x);
+    if let Some(centre) = centre {
+        values.place("centroid", centre);
     }
 }

@@ -17,9 +17,8 @@ const SMOOTH: f64 = 1e-6;
 pub(crate) fn recompute(mesh: &Mesh, claims: &Claims<'_>, values: &mut Values) {
     let Some(faces) = claims.count("faces") else { return };
     values.count("samples", mesh.positions.len());
-    let mean = centroid(mesh.positions.iter().copied());
-    for (k, x) in mean.into_iter().flat_map(|c| c.to_array()).enumerate() {
-        values.number(&format!("centroid.{k}"), x);
+    if let Some(mean) = centroid(mesh.positions.iter().copied()) {
+        values.place("centroid", mean);
     }
     if faces == 0 || !mesh.positions.len().is_multiple_of(faces) {
         return;

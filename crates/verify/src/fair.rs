@@ -5,7 +5,7 @@ use crate::catmull_clark::Subdivision;
 use crate::claims::{Claims, Values};
 use crate::content::{Mesh, centroid};
 use crate::edges::{Edges, Side};
-use crate::quadrature::gauss;
+use crate::quadrature::{gauss, piecewise};
 use crate::shape::Shape;
 use crate::spline::Spline;
 use glam::DVec3;
@@ -13,6 +13,10 @@ use rayon::prelude::*;
 
 /// Points per side of a bicubic patch, as the program's normal rule has.
 const NODES: usize = 8;
+/// Points per knot span of a written patch of few breaks, and of one of many.
+const SPAN_NODES: [usize; 2] = [10, 4];
+/// Breaks of a patch of few, at most.
+const FEW_BREAKS: usize = 3;
 /// What the root is regularised with, over the area, see the functional `sqrt`.
 const ROOT_EPSILON: f64 = 1e-3;
 /// Share of `|II|²` by which directions fade at umbilics, see the functional `mvs`.
@@ -30,15 +34,13 @@ pub(crate) fn recompute(mesh: &Mesh, claims: &Claims<'_>, values: &mut Values) {
     values.count("vertices", mesh.positions.len());
     values.count("patches", mesh.faces.len());
     if let Some(centre) = centroid(mesh.positions.iter().copied()) {
-        for (k, x) in centre.to_array().into_iter().enumerate() {
-            values.number(&format!("vertex_centroid.{k}"), x);
-        }
+        values.place("vertex_centroid", centre);
     }
     if let Some(rings) = claims.count("plain_rings") {
         let grids = plain_grids(mesh, &edges, rings);
         values.count("plain_patches", grids.len());
         if !grids.is_empty() {
-            energies(&mesh.positions, &grids, values);
+            plain_energies(&mesh.positions, &grids, values);
         }
     }
     let levels = (0..=LEVELS).rev().find(|l| mesh.faces.len() << (2 * l) <= MOST_FACES);
@@ -117,51 +119,80 @@ struct Sums {
     roots: Vec<(f64, f64)>,
 }
 
-fn energies(positions: &[DVec3], grids: &[[usize; 16]], values: &mut Values) {
-    let rule = gauss(NODES);
-    let nodes: Vec<f64> = rule.iter().map(|(x, _)| *x).collect();
-    let patch = |grid: &[usize; 16]| {
-        let points = grid.map(|v| positions[v]);
-        let mut sums = Sums::default();
-        let Ok(surface) = Spline::uniform_bicubic(&points) else { return sums };
-        let (us, vs) = (surface.ready(0, &nodes, 3), surface.ready(1, &nodes, 3));
-        for (u, (_, w)) in us.iter().zip(&rule) {
-            surface.row(u, &vs, |j, jet| {
-                let shape = Shape::new(jet);
-                let weight = w * rule[j].1 * shape.delta.sqrt();
-                let ([l, m, n], [a, b, c, d]) = shape.cubic(jet);
-                // κₙ'(θ) as a cubic form has the harmonics cos θ, sin θ, cos 3θ, sin 3θ.
-                let (c1, s1) = (0.75 * (a + c), 0.75 * (b + d));
-                let (c3, s3) = (0.25 * (a - 3.0 * c), 0.25 * (3.0 * b - d));
-                let (f1, f3) = (c1 * c1 + s1 * s1, c3 * c3 + s3 * s3);
-                // Twice the angle of the first principal direction.
-                let (cos, sin) = (0.5 * (l - n), m);
-                let r = cos * cos + sin * sin;
-                let second = l * l + 2.0 * m * m + n * n;
-                let guarded = r + UMBILIC_SHARE * second;
-                // cos 4φ and sin 4φ, faded at umbilics.
-                let (cos4, sin4) = if guarded > 0.0 {
-                    ((cos * cos - sin * sin) / guarded, 2.0 * cos * sin / guarded)
-                } else {
-                    (0.0, 0.0)
-                };
-                // Re((c1 − i s1)(c3 − i s3) e^{4iφ}).
-                let (re, im) = (c1 * c3 - s1 * s3, -(c1 * s3 + s1 * c3));
-                let coupling = re * cos4 - im * sin4;
-                sums.area += weight;
-                sums.mean += weight * shape.mean;
-                sums.gaussian += weight * shape.gaussian;
-                sums.bending += weight * second;
-                sums.f1 += weight * f1;
-                sums.f3 += weight * f3;
-                sums.mvs += weight * (f1 + f3 + 2.0 * coupling);
-                sums.mvs_cross += weight * (10.0 / 9.0 * f1 + 2.0 * f3 + 4.0 / 3.0 * coupling);
-                sums.roots.push((weight, f1 + f3));
-            });
-        }
-        sums
+/// Claims of the spline patches that stand for the surface in files for CAD.
+pub(crate) fn recompute_patches(patches: &[Spline], claims: &Claims<'_>, values: &mut Values) {
+    // A clamped border is not counted, and the file does not say where it is.
+    if claims.text("energies_of") != Some("all") {
+        return;
+    }
+    let rule = |s: &Spline, k: usize| {
+        let breaks = s.breaks(k);
+        piecewise(SPAN_NODES[usize::from(breaks.len() > FEW_BREAKS)], &breaks)
     };
-    let all: Vec<Sums> = grids.par_iter().map(patch).collect();
+    let sums = patches.par_iter().map(|s| sums(s, [rule(s, 0), rule(s, 1)]));
+    energies(&sums.collect::<Vec<_>>(), "written_energies", values);
+}
+
+/// Energies of the faces that are plain bicubic patches.
+fn plain_energies(positions: &[DVec3], grids: &[[usize; 16]], values: &mut Values) {
+    let rule = gauss(NODES);
+    let patch = |grid: &[usize; 16]| match Spline::uniform_bicubic(&grid.map(|v| positions[v])) {
+        Ok(surface) => sums(&surface, [rule.clone(), rule.clone()]),
+        Err(_) => Sums::default(),
+    };
+    energies(&grids.par_iter().map(patch).collect::<Vec<_>>(), "plain_energies", values);
+}
+
+/// Integrals over a surface by a rule in each direction.
+fn sums(surface: &Spline, rules: [Vec<(f64, f64)>; 2]) -> Sums {
+    let [us, vs] = [0, 1].map(|k| {
+        let nodes: Vec<f64> = rules[k].iter().map(|(x, _)| *x).collect();
+        surface.ready(k, &nodes, 3)
+    });
+    let mut sums = Sums::default();
+    for (u, (_, w)) in us.iter().zip(&rules[0]) {
+        surface.row(u, &vs, |j, jet| {
+            let shape = Shape::new(jet);
+            if !shape.mean.is_finite() {
+                // A singular point, which has no area.
+                return;
+            }
+            let weight = w * rules[1][j].1 * shape.delta.sqrt();
+            let ([l, m, n], [a, b, c, d]) = shape.cubic(jet);
+            // κₙ'(θ) as a cubic form has the harmonics cos θ, sin θ, cos 3θ, sin 3θ.
+            let (c1, s1) = (0.75 * (a + c), 0.75 * (b + d));
+            let (c3, s3) = (0.25 * (a - 3.0 * c), 0.25 * (3.0 * b - d));
+            let (f1, f3) = (c1 * c1 + s1 * s1, c3 * c3 + s3 * s3);
+            // Twice the angle of the first principal direction.
+            let (cos, sin) = (0.5 * (l - n), m);
+            let r = cos * cos + sin * sin;
+            let second = l * l + 2.0 * m * m + n * n;
+            let guarded = r + UMBILIC_SHARE * second;
+            // cos 4φ and sin 4φ, faded at umbilics.
+            let (cos4, sin4) = if guarded > 0.0 {
+                ((cos * cos - sin * sin) / guarded, 2.0 * cos * sin / guarded)
+            } else {
+                (0.0, 0.0)
+            };
+            // Re((c1 − i s1)(c3 − i s3) e^{4iφ}).
+            let (re, im) = (c1 * c3 - s1 * s3, -(c1 * s3 + s1 * c3));
+            let coupling = re * cos4 - im * sin4;
+            sums.area += weight;
+            sums.mean += weight * shape.mean;
+            sums.gaussian += weight * shape.gaussian;
+            sums.bending += weight * second;
+            sums.f1 += weight * f1;
+            sums.f3 += weight * f3;
+            sums.mvs += weight * (f1 + f3 + 2.0 * coupling);
+            sums.mvs_cross += weight * (10.0 / 9.0 * f1 + 2.0 * f3 + 4.0 / 3.0 * coupling);
+            sums.roots.push((weight, f1 + f3));
+        });
+    }
+    sums
+}
+
+/// All functionals, below a key.
+fn energies(all: &[Sums], key: &str, values: &mut Values) {
     let sum = |f: fn(&Sums) -> f64| all.iter().map(f).sum::<f64>();
     let area = sum(|s| s.area);
     let (f1, f3) = (sum(|s| s.f1), sum(|s| s.f3));
@@ -187,7 +218,7 @@ fn energies(positions: &[DVec3], grids: &[[usize; 16]], values: &mut Values) {
         ("sqrt", root),
     ];
     for (name, value) in scaled {
-        values.number(&format!("plain_energies.{name}"), value);
+        values.number(&format!("{key}.{name}"), value);
     }
 }
 

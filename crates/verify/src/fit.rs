@@ -1,5 +1,6 @@
 //! Claims of `fit`: distances of the input's points from the written surface.
 
+use crate::ball::diameter;
 use crate::claims::Values;
 use crate::content::{Content, diagonal};
 use crate::spline::{NearestGrid, Spline};
@@ -29,7 +30,10 @@ pub(crate) fn recompute(surface: &Spline, input: Option<&Content>, values: &mut 
     values.number("distance_mean", distances.iter().sum::<f64>() / count);
     values.number("distance_rms", (distances.iter().map(|d| d * d).sum::<f64>() / count).sqrt());
     values.number("distance_max", most);
-    if let Some(size) = diagonal(points.into_iter()).filter(|d| *d > 0.0) {
+    if let Some(size) = diameter(points.iter().copied()) {
         values.number("distance_max_percent", 100.0 * most / size);
+    }
+    if let Some(length) = diagonal(points.into_iter()).filter(|d| *d > 0.0) {
+        values.number("distance_max_percent_box", 100.0 * most / length);
     }
 }

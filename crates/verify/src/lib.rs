@@ -27,6 +27,7 @@
 
 mod analyze;
 mod asymptotic;
+mod ball;
 mod catmull_clark;
 mod claims;
 mod content;
@@ -53,4 +54,4 @@ pub use quadrature::{gauss, piecewise};
 pub use recompute::check;
 pub use shape::{Shape, Slopes, angle_deg};
 pub use spline::{Jet, NearestGrid, ORDER, Ready, Spline, SplineError};
-pub use table::{Accuracy, Row, TABLE, markdown, row_of};
+pub use table::{Accuracy, Row, Scale, TABLE, markdown, row_of};

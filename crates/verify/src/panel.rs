@@ -103,11 +103,25 @@ fn on_molds(content: &Content, design: &Spline, values: &mut Values) {
     spread(&mut gaps, "gap", "", 1.0, values);
     spread(&mut kinks, "kink", "_deg", 1.0, values);
     let all = points.iter().flat_map(|p| p.points.iter().copied());
-    if let Some(size) = diagonal(all).filter(|d| *d > 0.0) {
-        let most = offsets.iter().copied().fold(0.0, f64::max);
-        values.number("deviation_max_percent", 100.0 * most / size);
-        values.number("deviation_rms_percent", 100.0 * rms(offsets.into_iter()) / size);
-        spread(&mut gaps, "gap", "_percent", 100.0 / size, values);
+    percentages(design, diagonal(all), &offsets, &mut gaps, values);
+}
+
+/// Deviations and gaps in percent of the size of the design, and of the diagonal of the box around
+/// the points of it that panels were fitted to.
+fn percentages(
+    design: &Spline,
+    diagonal: Option<f64>,
+    offsets: &[f64],
+    gaps: &mut [f64],
+    values: &mut Values,
+) {
+    let most = offsets.iter().copied().fold(0.0, f64::max);
+    for (of, length) in [("", design.size()), ("_box", diagonal.filter(|d| *d > 0.0))] {
+        let Some(length) = length else { continue };
+        values.number(&format!("deviation_max_percent{of}"), 100.0 * most / length);
+        let rms = rms(offsets.iter().copied());
+        values.number(&format!("deviation_rms_percent{of}"), 100.0 * rms / length);
+        spread(gaps, "gap", &format!("_percent{of}"), 100.0 / length, values);
     }
 }
 
@@ -246,7 +260,7 @@ fn rms(list: impl Iterator<Item = f64>) -> f64 {
 }
 
 /// Distances of all points from the design. The feet are the points of the design the panels were
-/// fitted to; the box around them is what percentages refer to.
+/// fitted to.
 fn deviations(panels: &[Panel], design: &Spline, gaps: &mut [f64], values: &mut Values) {
     let grid = NearestGrid::new(design);
     let points: Vec<DVec3> = panels.iter().flat_map(|p| p.points.iter().copied()).collect();
@@ -257,13 +271,8 @@ fn deviations(panels: &[Panel], design: &Spline, gaps: &mut [f64], values: &mut 
             (design.jet(u, v, 0).d[0][0], far)
         })
         .collect();
-    let Some(size) = diagonal(found.iter().map(|(foot, _)| *foot)).filter(|d| *d > 0.0) else {
-        return;
-    };
-    let most = found.iter().map(|(_, far)| *far).fold(0.0, f64::max);
-    values.number("deviation_max_percent", 100.0 * most / size);
-    values.number("deviation_rms_percent", 100.0 * rms(found.iter().map(|(_, far)| *far)) / size);
-    spread(gaps, "gap", "_percent", 100.0 / size, values);
+    let (feet, offsets): (Vec<DVec3>, Vec<f64>) = found.into_iter().unzip();
+    percentages(design, diagonal(feet.into_iter()), &offsets, gaps, values);
 }
 
 #[cfg(test)]

@@ -2,8 +2,9 @@
 
 use crate::claims::{Claims, Finding, Values};
 use crate::content::Content;
-use crate::table::row_of;
+use crate::table::{Scale, row_of};
 use crate::{analyze, asymptotic, convert, darboux, fair, fit, hnet, panel, weingarten};
+use glam::DVec3;
 use serde_json::Value;
 
 /// Every number of `metrics` compared with what `file`, written by `command`, gives; `input` is
@@ -16,30 +17,48 @@ pub fn check(
     input: Option<&Content>,
 ) -> Vec<Finding> {
     let claims = Claims::new(metrics);
-    let values = recompute(command, &claims, file, input);
+    let (size, center) = file.extent();
+    // Measured at the origin, where nothing is lost to rounding.
+    let center = rounded(center, size);
+    let (file, input) = (file.moved(-center), input.map(|i| i.moved(-center)));
+    let values = recompute(command, &claims, &file, input.as_ref(), Values::around(center));
     // The scale of lengths: the larger of the two, since deviations are of the input's size.
-    let size = file.size().max(input.map_or(0.0, Content::size));
+    let size = input.as_ref().map_or(size, |i| size.max(i.extent().0));
+    let all = input.iter().chain([&file]);
+    let count = all.map(Content::most_in_a_direction).max().unwrap_or(1);
+    let scale = Scale { size, distance: center.length(), count };
     let is_single = file.is_single || (command == "convert" && input.is_some_and(|i| i.is_single));
     let numbers = claims.numbers().into_iter();
     numbers
         .map(|claim| {
             let row = row_of(command, &claim.0);
-            Finding::new(claim, row, &values, (size, is_single))
+            Finding::new(claim, row, &values, (&scale, is_single))
         })
         .collect()
 }
+
+/// A place nearby that coordinates far from the origin can be moved from without rounding.
+fn rounded(center: DVec3, size: f64) -> DVec3 {
+    let grid = size.log2().floor().exp2() * GRID;
+    (center / grid).round() * grid
+}
+
+/// The grid of such places, a share of the size.
+const GRID: f64 = 1.0 / 1_048_576.0;
 
 fn recompute(
     command: &str,
     claims: &Claims<'_>,
     file: &Content,
     input: Option<&Content>,
+    mut values: Values,
 ) -> Values {
-    let mut values = Values::default();
     let input_surface = input.and_then(|i| one(&i.surfaces));
     match command {
         "weingarten" => {
-            if let Some(surface) = one(&file.surfaces) {
+            // Of a trimmed surface a part is measured.
+            let is_whole = !file.is_trimmed && input.is_none_or(|i| !i.is_trimmed);
+            if let Some(surface) = one(&file.surfaces).filter(|_| is_whole) {
                 weingarten::recompute(surface, input_surface, claims, &mut values);
             }
         }
@@ -64,10 +83,12 @@ fn recompute(
                 darboux::recompute(mesh, claims, &mut values);
             }
         }
-        "asymptotic" => asymptotic::recompute(&file.surfaces, file.size(), &mut values),
+        "asymptotic" => asymptotic::recompute(&file.surfaces, file.extent().0, &mut values),
         "fair" => {
             if let Some(mesh) = file.mesh() {
                 fair::recompute(mesh, claims, &mut values);
+            } else if !file.surfaces.is_empty() {
+                fair::recompute_patches(&file.surfaces, claims, &mut values);
             }
         }
         "fit" => {
@@ -77,7 +98,7 @@ fn recompute(
         }
         "analyze" => {
             let is_regular = claims.count("singular_points") == Some(0);
-            if !file.surfaces.is_empty() && is_regular {
+            if !file.surfaces.is_empty() && is_regular && !file.is_trimmed {
                 analyze::recompute(&file.surfaces, &mut values);
             }
         }

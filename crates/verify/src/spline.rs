@@ -1,5 +1,6 @@
 //! Tensor-product splines as plain numbers, evaluated by de Boor's algorithm.
 
+use crate::ball::diameter;
 use glam::{DVec3, DVec4};
 use rayon::prelude::*;
 
@@ -122,6 +123,28 @@ impl Spline {
     /// All control points, those a closed direction repeats included.
     pub fn control_points(&self) -> impl Iterator<Item = DVec3> {
         self.points.iter().map(|p| p.truncate() / p.w)
+    }
+
+    /// The same moved by a vector.
+    #[must_use]
+    pub fn moved(&self, by: DVec3) -> Self {
+        let mut moved = self.clone();
+        // From the points themselves: the products with weights are rounded where they stand.
+        moved.points.iter_mut().zip(&self.points).for_each(|(q, p)| {
+            *q = (p.truncate() + by * p.w).extend(p.w);
+        });
+        moved
+    }
+
+    /// Diameter of the smallest ball around the points of a grid of 20 cells to a control point in
+    /// each direction, of at most 400 or, for nets of more than 200, two to a control point.
+    #[must_use]
+    pub fn size(&self) -> Option<f64> {
+        let [u, v] = [0, 1].map(|k| {
+            let n = self.different_counts()[k];
+            self.equidistant(k, (20 * n).min((2 * n).max(400)) + 1)
+        });
+        diameter(self.jets(&u, &v, 0).iter().map(|jet| jet.d[0][0]))
     }
 
     /// Degrees in u and v.

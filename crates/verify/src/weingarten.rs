@@ -45,7 +45,7 @@ pub(crate) fn recompute(
     values.number("mean_curvature_max", h[1]);
     values.number("gaussian_curvature_min", k[0]);
     values.number("gaussian_curvature_max", k[1]);
-    let size = diagonal(input.unwrap_or(surface).control_points()).unwrap_or(1.0);
+    let size = input.unwrap_or(surface).size().unwrap_or(1.0);
     let [alignment, area] = alignment(surface, &samples, size, h, k);
     values.number("alignment_rms", alignment);
     values.number("diagram_area", area);
@@ -110,8 +110,7 @@ fn deviations(
         .zip(&there)
         .map(far)
         .fold((0.0, 0.0_f64), |(sum, most), d| (sum + d, most.max(d)));
-    values.number("deviation_mean_percent", 100.0 * sum / jets.len() as f64 / size);
-    values.number("deviation_max_percent", 100.0 * most / size);
+    let mean = sum / jets.len() as f64;
     // The open sides at the same parameters and at their ends.
     let with_ends = |t: &[f64], k: usize| {
         let [start, end] = surface.domain(k);
@@ -131,7 +130,12 @@ fn deviations(
         };
         border = both(surface).iter().zip(&both(input)).map(far).fold(border, f64::max);
     }
-    values.number("boundary_deviation_max_percent", 100.0 * border / size);
+    let diagonal = diagonal(input.control_points()).unwrap_or(1.0);
+    for (of, length) in [("", size), ("_box", diagonal)] {
+        values.number(&format!("deviation_mean_percent{of}"), 100.0 * mean / length);
+        values.number(&format!("deviation_max_percent{of}"), 100.0 * most / length);
+        values.number(&format!("boundary_deviation_max_percent{of}"), 100.0 * border / length);
+    }
 }
 
 /// Root mean square distance from the relation the metrics name, on the surface scaled by
@@ -219,12 +223,16 @@ mod tests {
         let (surface, input) = (paraboloid(0.1), paraboloid(0.0));
         recompute(&surface, Some(&input), &Claims::new(&metrics), &mut values);
         let get = |key: &str| values.get(key).unwrap();
-        // The control points of the input span 2 x 2 x 2.
-        let percent = 100.0 * 0.1 / 12f64.sqrt();
-        for key in ["deviation_mean_percent", "deviation_max_percent"] {
-            assert!((get(key) - percent).abs() < 1e-12);
+        // The control points of the input span 2 x 2 x 2; the surface is a bowl one deep whose rim
+        // at that height has four corners, and the ball around it goes through them alone.
+        for (of, length) in [("", 8f64.sqrt()), ("_box", 12f64.sqrt())] {
+            let percent = 100.0 * 0.1 / length;
+            for key in ["deviation_mean_percent", "deviation_max_percent"] {
+                assert!((get(&format!("{key}{of}")) - percent).abs() < 1e-12);
+            }
+            let border = get(&format!("boundary_deviation_max_percent{of}"));
+            assert!((border - percent).abs() < 1e-12);
         }
-        assert!((get("boundary_deviation_max_percent") - percent).abs() < 1e-12);
         assert!(get("alignment_rms") < 1e-13 && get("diagram_area") < 1e-13);
         // K = 1/(1 + r²)² at the middle of the cell nearest to the top (12 x 10 cells).
         let r = (1.0_f64 / 12.0).hypot(0.1);

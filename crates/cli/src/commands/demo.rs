@@ -6,6 +6,7 @@ use crate::context::Context;
 use crate::failure::Failure;
 use crate::outcome::Outcome;
 use crate::panel_files::encode;
+use crate::paths::Choice;
 use crate::report_support;
 use crate::report_support::panels::{gap_histogram, kink_histogram, panel_view, seam_table};
 use crate::report_support::weingarten::weingarten_report;
@@ -92,7 +93,7 @@ impl Demo {
         let pages = ReportArgs { report: Some(page.clone()), figures: None };
         report_support::add_files(&mut outcome, &pages, context, report)?;
         let seconds = begin.elapsed().as_secs_f64();
-        let file = outcome.metrics_file("demo", seconds, context.threads);
+        let file = outcome.metrics_file("demo", seconds, context.threads, &Choice::default());
         outcome.files.push((metrics.clone(), file));
         let written: Vec<String> = paths.iter().map(|p| p.display().to_string()).collect();
         outcome.summary.push(format!("written: {}", written.join(", ")));

@@ -3,6 +3,7 @@
 use crate::context::Context;
 use crate::failure::Failure;
 use crate::outcome::{Outcome, Status};
+use crate::paths::{Choice, STDOUT};
 use crate::written;
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
@@ -35,6 +36,8 @@ struct Run {
     input: Option<String>,
     outputs: Vec<String>,
     metrics: serde_json::Value,
+    #[serde(flatten)]
+    choice: Choice,
 }
 
 impl Verify {
@@ -91,7 +94,7 @@ impl Verify {
 
     fn input_of(&self, run: &Run, outcome: &mut Outcome) -> Result<Option<Content>, Failure> {
         if let Some(path) = &self.input {
-            return written::read_input(path).map(Some);
+            return written::read_input(path, &run.choice).map(Some);
         }
         if run.command == "demo" {
             let model = exchange::read_scene(super::demo::ROOF).map_err(Failure::other)?;
@@ -99,7 +102,10 @@ impl Verify {
         }
         let Some(name) = &run.input else { return Ok(None) };
         // What a claim about the input is worth without it: nothing; the others stand.
-        let read = written::read_input(&self.found(name));
+        let read = match name.as_str() {
+            STDOUT => Err(Failure::usage("it was standard input; give a file of it as --input")),
+            _ => written::read_input(&self.found(name), &run.choice),
+        };
         Ok(read.map_err(|e| outcome.warnings.push(format!("the input is left out: {e}"))).ok())
     }
 }

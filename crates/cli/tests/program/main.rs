@@ -3,6 +3,7 @@
 
 mod asymptotic;
 mod bad_input;
+mod careful_files;
 mod common;
 mod dist;
 #[path = "../../examples/dist.rs"]
@@ -10,7 +11,6 @@ mod dist;
 mod dist_example;
 mod every_command;
 mod fair;
-mod careful_files;
 mod files;
 mod hyperbolic;
 #[cfg(unix)]

@@ -1,7 +1,8 @@
 //! `verify` finds what its runs claim in their files, and a control point that has moved by a
 //! millionth of the size.
 
-use crate::common::{message, umbilic};
+use crate::common::{message, root, umbilic, write_into};
+use geom_core::DVec3;
 use std::fs;
 use std::path::Path;
 
@@ -94,6 +95,50 @@ fn weingarten() {
 }
 
 #[test]
+fn far_from_the_origin_and_in_rhino() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let mut model = exchange::read_model(&root().join("fixtures/roof.ron")).expect("a fixture");
+    let far = DVec3::new(5e5, -2.5e5, 1e4);
+    model.surfaces.iter_mut().for_each(|s| s.surface = s.surface.translated(far));
+    let moved_roof = write_into(&folder, "far.ron", &exchange::write_scene(&model).expect("text"));
+    for (input, file) in [(moved_roof.as_str(), "a.step"), ("fixtures/roof.ron", "a.3dm")] {
+        let args = ["weingarten", input, "--iterations", "2", "--levels", "10x8"];
+        let (code, text) = Run::of(&args, file).verified(&[]);
+        assert_eq!(code, 0, "{text}");
+        assert!(text.contains("14 claims checked, 0 differ"), "{text}");
+    }
+    let args = ["weingarten", &moved_roof, "--iterations", "2", "--levels", "10x8"];
+    Run::of(&args, "a.step").check("a.step", 14, |text| moved_in_step(text, 30, ROOF));
+}
+
+#[test]
+fn what_was_chosen_of_a_file_is_what_claims_are_about() {
+    let bracket = "fixtures/step/bracket.step";
+    let (code, text) = Run::of(&["analyze", bracket, "--surface", "2"], "").verified(&[]);
+    assert_eq!(code, 0, "{text}");
+    // Of a trimmed surface a part is measured, which is not checked.
+    let trimmed = "fixtures/step/bicubic-hole.step";
+    let run = Run::of(&["weingarten", trimmed, "--iterations", "1", "--levels", "none"], "a.step");
+    let (code, text) = run.verified(&[]);
+    assert_eq!(code, 0, "{text}");
+    assert!(text.contains("0 claims checked"), "{text}");
+}
+
+#[test]
+fn what_was_standard_input_is_left_out_or_named() {
+    let run = Run::of(&["fit", "fixtures/grid.obj"], "a.step");
+    let text = fs::read_to_string(run.path("metrics.json")).expect("written");
+    let piped = text.replace("\"fixtures/grid.obj\"", "\"-\"");
+    assert_ne!(text, piped);
+    fs::write(run.path("metrics.json"), piped).expect("written");
+    let (code, text) = run.verified(&[]);
+    assert_eq!(code, 0, "{text}");
+    assert!(text.contains("standard input; give a file of it as --input"), "{text}");
+    let (_, with_input) = run.verified(&["--input", "fixtures/grid.obj"]);
+    assert!(with_input.contains("10 claims checked, 0 differ"), "{with_input}");
+}
+
+#[test]
 fn panel() {
     let args = ["panel", "fixtures/roof.ron", "--panels", "6x5", "--seam-steps", "1"];
     let types = ["--mold-types", "cubic"];
@@ -138,6 +183,8 @@ fn fair() {
     let args = ["fair", "fixtures/quads/cube.obj", "--levels", "0", "--iterations", "2"];
     let run = Run::of(&args, "a.obj");
     run.check("a.obj", 6, |text| moved(text, "v ", 11, 2e-6));
+    let run = Run::of(&args, "a.step");
+    run.check("a.step", 14, |text| moved_in_step(text, 5, 2e-6));
 }
 
 #[test]
