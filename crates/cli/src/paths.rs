@@ -17,7 +17,7 @@ const FOLDERS: [&str; 4] = ["figures", "lamellas", "dump_system", "folder"];
 /// Arguments whose output may be the standard one.
 const STREAMS: [&str; 2] = ["report", "metrics"];
 
-/// Stands for standard output.
+/// Stands for standard output, and as an input for standard input.
 pub(crate) const STDOUT: &str = "-";
 
 /// An argument and the file it names.
@@ -78,7 +78,9 @@ impl Paths {
                 // Some options take a file in place of a value, behind a word.
                 let text = path.to_string_lossy();
                 let behind = text.split_once('=').map(|(_, rest)| PathBuf::from(rest));
-                let files = [Some(path.clone()), behind].into_iter().flatten();
+                // What a shell has put behind standard input is a file as well.
+                let piped = (path == Path::new(STDOUT)).then(|| PathBuf::from("/dev/stdin"));
+                let files = [Some(path.clone()), behind, piped].into_iter().flatten();
                 self.inputs.extend(files.filter(|p| p.is_file()).map(|p| (id.to_owned(), p)));
             }
         }

@@ -136,6 +136,22 @@ impl Spline {
         moved
     }
 
+    /// The same with its parameters exchanged.
+    #[must_use]
+    pub fn swapped(&self) -> Self {
+        let [n_u, n_v] = self.counts;
+        let points = (0..n_u * n_v).map(|k| self.points[(k % n_u) * n_v + k / n_u]);
+        let ([p, q], [u, v], [a, b]) = (self.degree, self.knots.clone(), self.closed);
+        Self {
+            degree: [q, p],
+            knots: [v, u],
+            counts: [n_v, n_u],
+            points: points.collect(),
+            is_rational: self.is_rational,
+            closed: [b, a],
+        }
+    }
+
     /// Diameter of the smallest ball around the points of a grid of 20 cells to a control point in
     /// each direction, of at most 400 or, for nets of more than 200, two to a control point.
     #[must_use]
@@ -586,6 +602,15 @@ mod tests {
         assert!((gap.length() - far).abs() < 1e-15);
         let ([u, _], _) = s.nearest(&grid, DVec3::new(-1.0, 0.5, 0.0));
         assert_eq!(u, 0.0);
+    }
+
+    #[test]
+    fn exchanged_parameters_give_the_same_points() {
+        let s = graph();
+        let (there, here) = (s.swapped().jet(0.8, 0.3, 2), s.jet(0.3, 0.8, 2));
+        assert!(there.d[0][0].distance(here.d[0][0]) < 1e-15);
+        assert!(there.d[2][0].distance(here.d[0][2]) < 1e-13);
+        assert_eq!(s.swapped().swapped(), s);
     }
 
     #[test]

@@ -18,6 +18,12 @@ pub(crate) fn recompute(
 ) {
     let [n_u, n_v] = surface.different_counts();
     values.count("control_points", n_u * n_v);
+    let surface = match input {
+        Some(input) => &like(surface, input),
+        // Which way round it was is not known.
+        None if surface.closed() == [true; 2] => return,
+        None => surface,
+    };
     let (Some(m_u), Some(m_v)) = (claims.count("samples_u"), claims.count("samples_v")) else {
         return;
     };
@@ -54,6 +60,25 @@ pub(crate) fn recompute(
     }
     if let Some(rms) = relation_rms(claims, &samples) {
         values.number("relation_rms", rms);
+    }
+}
+
+/// The surface with the parameters of its input: a closed one is written so that its normals are
+/// outside, which may exchange them.
+fn like(surface: &Spline, input: &Spline) -> Spline {
+    const PLACES: usize = 9;
+    let apart = |s: &Spline| {
+        let is_same = (0..2).all(|k| s.domain(k) == input.domain(k));
+        let at = [0, 1].map(|k| input.equidistant(k, PLACES));
+        let far = |(a, b): (&Jet, &Jet)| a.d[0][0].distance(b.d[0][0]);
+        let there = input.jets(&at[0], &at[1], 0);
+        is_same.then(|| s.jets(&at[0], &at[1], 0).iter().zip(&there).map(far).sum::<f64>())
+    };
+    let swapped = surface.swapped();
+    match (apart(surface), apart(&swapped)) {
+        (None, Some(_)) => swapped,
+        (Some(here), Some(there)) if there < here => swapped,
+        _ => surface.clone(),
     }
 }
 

@@ -66,6 +66,42 @@ fn links_do_not_hide_what_is_read() {
     assert_eq!(fs::read_to_string(&out).expect("there"), "old");
 }
 
+#[cfg(target_os = "linux")]
+#[test]
+fn what_comes_through_standard_input_is_not_overwritten() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let file = name(&folder.path().join("in.ron"));
+    fs::copy(root().join("fixtures/roof.ron"), &file).expect("copied");
+    let before = fs::read(&file).expect("there");
+    let script = "exec \"$0\" convert - \"$1\" < \"$1\"";
+    let mut shell = Command::new("sh");
+    let result = shell.args(["-c", script, UMBILIC, &file]).output().expect("a shell");
+    let said = message(&result);
+    assert_eq!(result.status.code(), Some(2), "{said}");
+    let want = format!("umbilic: {file}: is the file /dev/stdin that this run reads");
+    assert!(said.starts_with(&want), "{said}");
+    assert_eq!(fs::read(&file).expect("there"), before);
+}
+
+#[cfg(unix)]
+#[test]
+fn a_rhino_file_is_replaced_with_care() {
+    use std::os::unix::fs::PermissionsExt;
+    let folder = tempfile::tempdir().expect("a folder");
+    let file = name(&folder.path().join("a.3dm"));
+    let convert = ["convert", "fixtures/roof.ron", &file, "-q"];
+    let mode = |bits: u32| fs::set_permissions(&file, fs::Permissions::from_mode(bits));
+    assert!(umbilic(&convert).status.success());
+    mode(0o640).expect("ours");
+    assert!(umbilic(&convert).status.success());
+    let now = fs::metadata(&file).expect("there").permissions().mode();
+    assert_eq!(now & 0o777, 0o640);
+    mode(0o440).expect("ours");
+    refused(&convert, &format!("{file}: is write-protected"));
+    mode(0o640).expect("ours");
+    refused(&["convert", &file, &file], &format!("{file}: this run reads the file"));
+}
+
 #[test]
 fn folders_of_options_are_made() {
     let folder = tempfile::tempdir().expect("a folder");
