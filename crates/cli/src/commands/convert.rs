@@ -128,8 +128,8 @@ fn summary(path: &Path, model: &Model, bytes: usize) -> Vec<String> {
         format!("  lengths in {}, {size}", model.unit),
     ]
 }
-/// The `metrics` object: what the input holds, and the mean of its control points if it has
-/// surfaces, else of its vertices.
+/// The `metrics` object: what is written, and the mean of its control points if it has surfaces,
+/// else of its vertices.
 #[derive(Serialize)]
 struct ConvertMetrics {
     surfaces: usize,

@@ -4,7 +4,6 @@
 mod asymptotic;
 mod bad_input;
 mod careful_files;
-mod careful_files;
 mod common;
 mod dist;
 #[path = "../../examples/dist.rs"]
