@@ -29,6 +29,9 @@ pub struct Spline {
     degree: [usize; 2],
     knots: [Vec<f64>; 2],
     counts: [usize; 2],
+    /// Control points.
+    places: Vec<DVec3>,
+    /// The same times their weights, with these.
     points: Vec<DVec4>,
     is_rational: bool,
     closed: [bool; 2],
@@ -69,12 +72,14 @@ impl Spline {
         {
             return Err(SplineError::Weights { found: weights.len(), points: points.len() });
         }
+        let places = points.to_vec();
         let weight = |k: usize| weights.map_or(1.0, |w| w[k]);
         let points = points.iter().enumerate().map(|(k, p)| (*p * weight(k)).extend(weight(k)));
         Ok(Self {
             degree,
             knots,
             counts,
+            places,
             points: points.collect(),
             is_rational: weights.is_some(),
             closed: [false; 2],
@@ -122,17 +127,18 @@ impl Spline {
 
     /// All control points, those a closed direction repeats included.
     pub fn control_points(&self) -> impl Iterator<Item = DVec3> {
-        self.points.iter().map(|p| p.truncate() / p.w)
+        self.places.iter().copied()
     }
 
     /// The same moved by a vector.
     #[must_use]
     pub fn moved(&self, by: DVec3) -> Self {
         let mut moved = self.clone();
-        // From the points themselves: the products with weights are rounded where they stand.
-        moved.points.iter_mut().zip(&self.points).for_each(|(q, p)| {
-            *q = (p.truncate() + by * p.w).extend(p.w);
-        });
+        // The products with weights are rounded where they stand, so they are made anew.
+        for (place, point) in moved.places.iter_mut().zip(&mut moved.points) {
+            *place += by;
+            *point = (*place * point.w).extend(point.w);
+        }
         moved
     }
 
@@ -140,12 +146,15 @@ impl Spline {
     #[must_use]
     pub fn swapped(&self) -> Self {
         let [n_u, n_v] = self.counts;
-        let points = (0..n_u * n_v).map(|k| self.points[(k % n_u) * n_v + k / n_u]);
+        let from = |k: usize| (k % n_u) * n_v + k / n_u;
+        let places = (0..n_u * n_v).map(|k| self.places[from(k)]);
+        let points = (0..n_u * n_v).map(|k| self.points[from(k)]);
         let ([p, q], [u, v], [a, b]) = (self.degree, self.knots.clone(), self.closed);
         Self {
             degree: [q, p],
             knots: [v, u],
             counts: [n_v, n_u],
+            places: places.collect(),
             points: points.collect(),
             is_rational: self.is_rational,
             closed: [b, a],
@@ -184,8 +193,8 @@ impl Spline {
     /// A control point and its weight.
     #[must_use]
     pub fn control_point(&self, i: usize, j: usize) -> (DVec3, f64) {
-        let p = self.points[i * self.counts[1] + j];
-        (p.truncate() / p.w, p.w)
+        let k = i * self.counts[1] + j;
+        (self.places[k], self.points[k].w)
     }
 
     /// Start and end of a direction.
