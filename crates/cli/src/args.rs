@@ -3,7 +3,7 @@
 
 use crate::failure::Failure;
 use crate::outcome::Outcome;
-use crate::paths::STDOUT;
+use crate::stdout::STDOUT;
 use std::num::NonZeroUsize;
 use std::path::{Path, PathBuf};
 

@@ -14,9 +14,9 @@ use std::time::{Duration, Instant};
 use gp_solver::Checkpoint;
 
 use crate::checkpoints::Kept;
+use crate::choice::Choice;
 use crate::failure::{Failure, INTERRUPTED, say};
 use crate::outcome::{Outcome, Status};
-use crate::paths::Choice;
 
 /// How long a solver may take to stop by itself.
 const GRACE: Duration = Duration::from_millis(400);

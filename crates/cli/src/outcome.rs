@@ -1,8 +1,8 @@
 //! What a command hands back: files still in memory, numbers, and a summary.
 
-use crate::failure::Failure;
-use crate::paths::{Choice, STDOUT, twice};
-use crate::stdout;
+use crate::choice::Choice;
+use crate::failure::{Failure, twice};
+use crate::stdout::{self, STDOUT};
 use exchange::Model;
 use serde::Serialize;
 use std::path::{Path, PathBuf};

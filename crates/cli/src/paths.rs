@@ -3,10 +3,11 @@
 //! What is not an output is an input: whatever argument names a file that exists is taken for one
 //! that the run reads, so that no option is forgotten.
 
-use crate::failure::Failure;
+use crate::choice::Choice;
+use crate::failure::{Failure, twice};
 use crate::outcome::Outcome;
+use crate::stdout::STDOUT;
 use clap::{ArgMatches, Command};
-use serde::{Deserialize, Serialize};
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
@@ -17,23 +18,8 @@ const FOLDERS: [&str; 4] = ["figures", "lamellas", "dump_system", "folder"];
 /// Arguments whose output may be the standard one.
 const STREAMS: [&str; 2] = ["report", "metrics"];
 
-/// Stands for standard output, and as an input for standard input.
-pub(crate) const STDOUT: &str = "-";
-
 /// An argument and the file it names.
 type Named = (String, PathBuf);
-
-/// What was taken of the input, as the user said it; absent where nothing was.
-#[derive(Clone, Debug, Default, Deserialize, Serialize)]
-#[serde(default)]
-pub(crate) struct Choice {
-    #[serde(skip_serializing_if = "Vec::is_empty")]
-    pub(crate) surface: Vec<String>,
-    #[serde(skip_serializing_if = "Vec::is_empty")]
-    pub(crate) part: Vec<String>,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub(crate) input_format: Option<String>,
-}
 
 /// The files and folders of one command line.
 #[derive(Debug, Default)]
@@ -152,13 +138,4 @@ impl Paths {
     pub(crate) fn use_stdout(&self) -> bool {
         self.outputs.iter().any(|(_, path)| path == Path::new(STDOUT))
     }
-}
-
-/// Two results for one file.
-pub(crate) fn twice(path: &Path, other: &Path) -> Failure {
-    let message = "two results would be written to this file; name another for one";
-    if path == other {
-        return Failure::usage(format!("{}: {message}", path.display()));
-    }
-    Failure::usage(format!("{} and {}: {message}", other.display(), path.display()))
 }

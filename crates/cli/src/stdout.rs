@@ -3,6 +3,9 @@
 use crate::failure::Failure;
 use std::io::{self, ErrorKind, Write};
 
+/// Stands for standard output, and as an input for standard input.
+pub(crate) const STDOUT: &str = "-";
+
 /// Writes these bytes and flushes them.
 pub(crate) fn write(bytes: &[u8]) -> Result<(), Failure> {
     let mut out = io::stdout().lock();

@@ -1,7 +1,7 @@
 //! What written files hold, as plain numbers for checking them.
 
+use crate::choice::Choice;
 use crate::failure::Failure;
-use crate::paths::Choice;
 use bspline::{BsplineSurface, KnotVector};
 use exchange::{Model, Net, Pick};
 use geom_core::DVec3;

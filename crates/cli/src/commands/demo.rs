@@ -1,12 +1,12 @@
 //! `umbilic demo [DIR]`.
 
 use crate::args::ReportArgs;
+use crate::choice::Choice;
 use crate::commands::weingarten::outcome;
 use crate::context::Context;
 use crate::failure::Failure;
 use crate::outcome::Outcome;
 use crate::panel_files::encode;
-use crate::paths::Choice;
 use crate::report_support;
 use crate::report_support::panels::{gap_histogram, kink_histogram, panel_view, seam_table};
 use crate::report_support::weingarten::weingarten_report;

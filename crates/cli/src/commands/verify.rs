@@ -1,9 +1,10 @@
 //! `umbilic verify METRICS.json [FILE…]`.
 
+use crate::choice::Choice;
 use crate::context::Context;
 use crate::failure::Failure;
 use crate::outcome::{Outcome, Status};
-use crate::paths::{Choice, STDOUT};
+use crate::stdout::STDOUT;
 use crate::written;
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};

@@ -220,7 +220,7 @@ fn mirrored(key: &str) -> (String, f64) {
 }
 
 /// The metric that a key becomes where u and v are exchanged.
-fn exchanged(key: &str) -> String {
+fn exchanged_key(key: &str) -> String {
     match key {
         "samples_u" => "samples_v".to_owned(),
         "samples_v" => "samples_u".to_owned(),
@@ -240,7 +240,7 @@ fn compare(
         let Some(a) = number(before, key) else { continue };
         let Some(power) = power(key) else { continue };
         let (there, sign) = if motion.flips() { mirrored(key) } else { (key.clone(), 1.0) };
-        let there = if motion.exchanged { exchanged(&there) } else { there };
+        let there = if motion.exchanged { exchanged_key(&there) } else { there };
         let b = sign * number(after, &there).unwrap_or(f64::NAN) / motion.scale.powi(power);
         if let Some((_, most)) = ROUNDING.iter().find(|(k, _)| k == key) {
             if !(b.abs() <= *most) {
