@@ -205,6 +205,8 @@ fn power(key: &str) -> Option<i32> {
         _ if key.starts_with("mean_curvature") || key.starts_with("principal_curvature") => -1,
         // Bézier energies of curves and patches, energies of a subdivision surface.
         "strain_energy" | "thin_plate_energy" => 2,
+        // Working lengths per length.
+        "working_scale" => -1,
         "gaussian_jump_max" | "torsion_defect_max" => -2,
         "mean_jump_max" => -1,
         _ => 0,
@@ -239,6 +241,15 @@ fn mirrored(key: &str) -> (String, f64) {
     }
 }
 
+/// The metric that a key becomes where u and v are exchanged.
+fn exchanged_key(key: &str) -> String {
+    match key {
+        "samples_u" => "samples_v".to_owned(),
+        "samples_v" => "samples_u".to_owned(),
+        _ => key.to_owned(),
+    }
+}
+
 fn compare(
     what: &str,
     motion: &Motion,
@@ -251,6 +262,7 @@ fn compare(
         let Some(a) = number(before, key) else { continue };
         let Some(power) = power(key) else { continue };
         let (there, sign) = if motion.flips() { mirrored(key) } else { (key.clone(), 1.0) };
+        let there = if motion.exchanged { exchanged_key(&there) } else { there };
         let b = sign * number(after, &there).unwrap_or(f64::NAN) / motion.scale.powi(power);
         if let Some((_, most)) = ROUNDING.iter().find(|(k, most)| k == key && a.abs() <= *most) {
             if !(b.abs() <= *most) {

@@ -16,7 +16,7 @@ use gltf::json::validation::{Error as Fault, Validate};
 use gltf::mesh::Mode;
 use gltf::{Document, Semantic};
 use serde::Deserialize;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 /// The largest JSON part that is read: the description of a scene, not its coordinates.
 const MOST_JSON: usize = 4 << 20;
@@ -213,12 +213,19 @@ impl Scene<'_> {
         let mut sizes: BTreeMap<usize, usize> = BTreeMap::new();
         for mesh in self.document.meshes() {
             let mut bytes = 0_usize;
+            let mut counted = BTreeSet::new();
             for primitive in mesh.primitives() {
+                let positions = primitive.get(&Semantic::Positions);
                 // A count beyond the data is no size.
-                let counts = [primitive.get(&Semantic::Positions), primitive.indices()];
-                counts.iter().flatten().try_for_each(|a| numbers.check(a))?;
-                let vertices = primitive.get(&Semantic::Positions).map_or(0, |a| a.count());
-                let corners = primitive.indices().map_or(vertices, |a| a.count());
+                positions.iter().try_for_each(|a| numbers.check(a))?;
+                primitive.indices().iter().try_for_each(|a| numbers.check(a))?;
+                let corners = match primitive.indices() {
+                    Some(indices) => indices.count(),
+                    None => positions.as_ref().map_or(0, gltf::Accessor::count),
+                };
+                // Primitives that share their vertices share them in the mesh.
+                let is_new = |a: &gltf::Accessor<'_>| counted.insert(a.index());
+                let vertices = positions.filter(is_new).map_or(0, |a| a.count());
                 // A strip has three corners per index.
                 let per_corner = match primitive.mode() {
                     Mode::TriangleStrip | Mode::TriangleFan => 3 * PER_CORNER,
