@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::fmt;
 use std::time::Instant;
 
-use geom_core::{BoundingBox, DVec3, FaceId, PolyMesh};
+use geom_core::{BoundingBox, DVec3, FaceId, Normalization, PolyMesh};
 use gp_solver::{Observer, StageReport, Status};
 use serde::Serialize;
 use subdiv_catmull_clark::{Creases, SubdivisionSurface};
@@ -103,14 +103,19 @@ pub struct Metrics {
 }
 
 impl Metrics {
-    /// The numbers when every length is `factor` times what it was.
-    pub(crate) fn scale_lengths(&mut self, factor: f64) {
-        for functional in Functional::ALL {
-            if let Some(value) = self.energies.get_mut(functional.name()) {
-                *value *= factor.powi(functional.length_power());
+    /// The numbers of a surface in normalised coordinates as those of the model.
+    pub(crate) fn restore(&mut self, place: Normalization) {
+        let unit = place.scale().recip();
+        for table in std::iter::once(&mut self.energies).chain(&mut self.plain_energies) {
+            for functional in Functional::ALL {
+                if let Some(value) = table.get_mut(functional.name()) {
+                    *value *= unit.powi(functional.length_power());
+                }
             }
         }
-        self.torus_fit_rms = self.torus_fit_rms.map(|rms| rms * factor);
+        self.torus_fit_rms = self.torus_fit_rms.map(|rms| rms * unit);
+        let centroid = place.restore(DVec3::from_array(self.vertex_centroid));
+        self.vertex_centroid = centroid.to_array();
     }
 }
 

@@ -50,7 +50,7 @@ impl<'i> Placed<'i> {
         let unit = self.place.scale().recip();
         solution.before.scale_lengths(unit);
         solution.after.scale_lengths(unit);
-        solution.metrics.scale_lengths(unit);
+        solution.metrics.restore(self.place);
         Ok(solution)
     }
 

@@ -126,7 +126,7 @@ mod tests {
         let (mesh, warnings) = read_off(text).unwrap();
         assert!(warnings.is_empty());
         let (_, warnings) = read_off(&format!("{text}# fine\n\n4 0 1 2 3\n")).unwrap();
-        assert_eq!(warnings, ["line 12: what follows the last face is left out"]);
+        assert_eq!(warnings, ["line 13: what follows the last face is left out"]);
         assert_eq!(mesh.positions[4], DVec3::new(0.5, 2.0, 1.0));
         assert_eq!(mesh.faces.iter().collect::<Vec<_>>(), [&[0, 1, 2, 3][..], &[3, 2, 4]]);
         assert!(read_off("OFF 1 0 0\n1 2 3\n").is_ok());

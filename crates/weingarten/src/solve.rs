@@ -87,7 +87,8 @@ pub struct Solution {
 /// };
 /// let net = (0..64).map(|k| point(k / 8, k % 8)).collect();
 /// let surface = BsplineSurface::new(knots.clone(), knots, net, None)?;
-/// let solution = solve(&surface, &Options::default(), &mut ())?;
+/// let options = Options { iterations: 20, ..Options::default() };
+/// let solution = solve(&surface, &options, &mut ())?;
 /// assert!(solution.metrics.alignment_rms < 0.1 * solution.before.alignment_rms);
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
