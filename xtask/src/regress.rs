@@ -1,4 +1,5 @@
-//! `cargo xtask regress`: run the scenes and compare their metrics with what is expected.
+//! `cargo xtask regress`: run the scenes, compare their metrics with what is expected, and the files
+//! they write with what the metrics say.
 
 use crate::scene::{Expectation, NamedScene, all, look_up};
 use crate::shell::{Outcome, build_umbilic, read, root, umbilic, write};
@@ -13,7 +14,7 @@ pub(crate) fn run(names: &[&str]) -> Outcome<Vec<String>> {
         return Err(format!("there is no scene {unknown} under fixtures/regress"));
     }
     build_umbilic()?;
-    let (mut skipped, mut missed) = (Vec::new(), 0);
+    let (mut skipped, mut missed, mut untrue) = (Vec::new(), 0, Vec::new());
     for scene in scenes.iter().filter(|s| names.is_empty() || names.contains(&s.name.as_str())) {
         if let Some(reason) = missing_folder(scene) {
             skipped.push(format!("regress {}: {reason}", scene.name));
@@ -29,8 +30,45 @@ pub(crate) fn run(names: &[&str]) -> Outcome<Vec<String>> {
             let got = got.map_or_else(|| "nothing".to_owned(), Value::to_string);
             println!("  {} {key}: wanted {wanted}, got {got}", if holds { "ok  " } else { "MISS" });
         }
+        if let Some(said) = differences(scene)? {
+            println!("  MISS verify: the files are not what the metrics say\n{said}");
+            untrue.push(scene.name.as_str());
+        }
     }
-    if missed > 0 { Err(format!("{missed} values are not as expected")) } else { Ok(skipped) }
+    match (missed, untrue.is_empty()) {
+        (0, true) => Ok(skipped),
+        (0, false) => Err(format!("files and metrics differ in {}", untrue.join(", "))),
+        (_, true) => Err(format!("{missed} values are not as expected")),
+        (_, false) => Err(format!(
+            "{missed} values are not as expected, files and metrics differ in {}",
+            untrue.join(", ")
+        )),
+    }
+}
+
+/// What the program says of a scene whose files are not what its metrics claim.
+fn differences(scene: &NamedScene) -> Outcome<Option<String>> {
+    let metrics = scratch(scene).join("metrics.json");
+    let mut command = umbilic();
+    command.arg("verify").arg(&metrics);
+    let output = command.output().map_err(|e| format!("{}: {e}", scene.name))?;
+    match output.status.code() {
+        Some(0) => Ok(None),
+        Some(1) => {
+            let text = String::from_utf8_lossy(&output.stdout);
+            let lines = text.lines().filter(|line| line.contains("DIFFERS"));
+            Ok(Some(lines.collect::<Vec<_>>().join("\n")))
+        }
+        _ => {
+            let said = String::from_utf8_lossy(&output.stderr);
+            Err(format!("{}: verify ended with {}: {said}", scene.name, output.status))
+        }
+    }
+}
+
+/// The folder a scene writes to.
+fn scratch(scene: &NamedScene) -> PathBuf {
+    root().join("target/regress").join(&scene.name)
 }
 
 /// Rewrites the `CloseTo` values of one scene to what it measures now, keeping their tolerances.
@@ -75,7 +113,7 @@ fn missing_folder(scene: &NamedScene) -> Option<String> {
 
 /// Runs one scene in a scratch folder under `target` and reads the metrics it wrote.
 fn measure(scene: &NamedScene) -> Outcome<Value> {
-    let out = root().join("target/regress").join(&scene.name);
+    let out = scratch(scene);
     let _ = std::fs::remove_dir_all(&out);
     std::fs::create_dir_all(&out).map_err(|e| format!("{}: {e}", out.display()))?;
     let metrics = out.join("metrics.json");

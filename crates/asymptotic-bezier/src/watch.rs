@@ -1,6 +1,7 @@
 //! What goes along with a run: its observer, the caller's blocks, and what has been solved so far.
 
-use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Condvar, Mutex, PoisonError};
 use std::time::Duration;
 
 use geom_core::DVec3;
@@ -14,7 +15,7 @@ use crate::error::Error;
 
 /// The name of the method in checkpoints.
 const METHOD: &str = "asymptotic";
-/// How long the watching thread sleeps while others work.
+/// How often the watching thread looks up while others work.
 const POLL: Duration = Duration::from_micros(200);
 
 /// Whether those who work are to stop.
@@ -257,25 +258,26 @@ impl<'w, 'e> Watch<'w, 'e> {
         if !self.heeded {
             return Ok((0..count).into_par_iter().map(|k| work(k, &stop)).collect());
         }
-        let done = AtomicUsize::new(0);
+        let left = Left { count: Mutex::new(count), none: Condvar::new() };
         let mut slots: Vec<Option<T>> = (0..count).map(|_| None).collect();
         rayon::in_place_scope(|scope| {
             for (k, slot) in slots.iter_mut().enumerate() {
-                let (stop, done, work) = (&stop, &done, &work);
+                let (stop, left, work) = (&stop, &left, &work);
                 scope.spawn(move |_| {
-                    let _counted = Counted(done);
+                    let _counted = Counted(left);
                     if !stop.is_set() {
                         *slot = Some(work(k, stop));
                     }
                 });
             }
-            while done.load(Ordering::Acquire) < count {
+            loop {
                 if self.observer.stop_requested() {
                     stop.0.store(true, Ordering::Relaxed);
                 }
                 // On a thread of the pool the work may have no other thread to run on.
-                if !matches!(rayon::yield_now(), Some(rayon::Yield::Executed)) {
-                    std::thread::sleep(POLL);
+                let executed = matches!(rayon::yield_now(), Some(rayon::Yield::Executed));
+                if left.is_none_within(if executed { Duration::ZERO } else { POLL }) {
+                    break;
                 }
             }
         });
@@ -292,12 +294,32 @@ impl<'w, 'e> Watch<'w, 'e> {
     }
 }
 
-/// Counts when it goes, also in a panic.
-struct Counted<'d>(&'d AtomicUsize);
+/// How many pieces of work are not done.
+struct Left {
+    count: Mutex<usize>,
+    none: Condvar,
+}
+
+impl Left {
+    /// Whether all is done, or is so before the time is over.
+    fn is_none_within(&self, time: Duration) -> bool {
+        let count = self.count.lock().unwrap_or_else(PoisonError::into_inner);
+        let waited = self.none.wait_timeout_while(count, time, |count| *count > 0);
+        let (count, _) = waited.unwrap_or_else(PoisonError::into_inner);
+        *count == 0
+    }
+}
+
+/// Counts down when it goes, also in a panic.
+struct Counted<'l>(&'l Left);
 
 impl Drop for Counted<'_> {
     fn drop(&mut self) {
-        self.0.fetch_add(1, Ordering::Release);
+        let mut count = self.0.count.lock().unwrap_or_else(PoisonError::into_inner);
+        *count -= 1;
+        if *count == 0 {
+            self.0.none.notify_all();
+        }
     }
 }
 

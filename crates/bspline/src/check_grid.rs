@@ -129,11 +129,7 @@ impl BsplineSurface {
     #[must_use]
     pub fn flaws_against(&self, start: &Self) -> Vec<Flaw> {
         let [u, v] = start.check_parameters();
-        let normals = |surface: &Self| -> Vec<DVec3> {
-            let jets = surface.jet_grid(&u, &v, 1);
-            jets.iter().map(|jet| jet.d(1, 0).cross(jet.d(0, 1))).collect()
-        };
-        let (before, after) = (normals(start), normals(self));
+        let (before, after) = (start.area_vector_grid(&u, &v), self.area_vector_grid(&u, &v));
         let mut areas: Vec<f64> = before.iter().map(|n| n.length()).collect();
         let middle = areas.len() / 2;
         let median = *areas.select_nth_unstable_by(middle, f64::total_cmp).1;

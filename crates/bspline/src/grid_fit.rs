@@ -229,9 +229,14 @@ impl BsplineSurface {
             let form = jet.first_form();
             let Ok(determinant) = form.check() else { break };
             let (a, b) = (gap.dot(jet.d(1, 0)), gap.dot(jet.d(0, 1)));
-            let (du, dv) =
+            let (mut du, mut dv) =
                 ((form.g * a - form.f * b) / determinant, (form.e * b - form.f * a) / determinant);
-            // A step along a clamped side is halved until it helps, or given up.
+            // At a border that the step would leave, the other parameter moves alone.
+            if leaves(self.knots_u(), u, du) {
+                (du, dv) = (0.0, b / form.g);
+            } else if leaves(self.knots_v(), v, dv) {
+                (du, dv) = (a / form.e, 0.0);
+            }
             let mut step = 1.0;
             let improved = loop {
                 let (un, vn) = (
@@ -257,6 +262,12 @@ impl BsplineSurface {
         }
         ([u, v], best)
     }
+}
+
+/// Whether a step from `t` goes beyond an open end of the domain that `t` is at.
+fn leaves(knots: &KnotVector, t: f64, step: f64) -> bool {
+    let (start, end) = knots.domain();
+    !knots.is_periodic() && ((t <= start && step < 0.0) || (t >= end && step > 0.0))
 }
 
 #[cfg(test)]
@@ -321,6 +332,23 @@ mod tests {
         assert!(error.to_string().starts_with("9 parameters in u do not determine 10"), "{error}");
         let same = vec![DVec3::ONE; 30];
         assert!(fit_grid(&same, 6, 5, false, &GridFitOptions::default()).is_err());
+    }
+
+    #[test]
+    fn beyond_a_border_the_foot_is_the_nearest_point_of_it() {
+        let fit = fit_grid(&wave(9, 8), 9, 8, false, &GridFitOptions::default()).unwrap();
+        // Beyond the side u = 0 and askew, so that a step along both parameters leaves it.
+        let jet = fit.surface.jet(0.0, 0.4, 1);
+        let point = jet.position() - 0.2 * jet.d(1, 0) + 0.05 * jet.d(0, 1);
+        let ([u, v], distance) = fit.surface.foot_point(point, [0.0, 0.3]);
+        assert_eq!(u, 0.0);
+        let foot = fit.surface.jet(u, v, 1);
+        let gap = point - foot.position();
+        assert!(gap.dot(foot.d(0, 1)).abs() < 1e-5 * distance * foot.d(0, 1).length());
+        let nearest = (0..=1000)
+            .map(|k| fit.surface.point(0.0, 1e-3 * f64::from(k)).distance(point))
+            .fold(f64::INFINITY, f64::min);
+        assert!(distance <= nearest, "{distance} {nearest}");
     }
 
     #[test]

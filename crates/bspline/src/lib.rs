@@ -14,6 +14,7 @@ mod elementary;
 mod error;
 mod face;
 mod fit;
+mod grid;
 mod grid_fit;
 mod knots;
 mod lift;

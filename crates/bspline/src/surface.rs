@@ -182,12 +182,6 @@ impl BsplineSurface {
             .collect()
     }
 
-    /// Points on a grid of parameters, `[i * v.len() + j]`.
-    #[must_use]
-    pub fn point_grid(&self, u: &[f64], v: &[f64]) -> Vec<DVec3> {
-        self.jet_grid(u, v, 0).iter().map(SurfaceJet::position).collect()
-    }
-
     /// The jet from basis values already at hand.
     fn jet_of(&self, basis_u: &BasisValues, basis_v: &BasisValues, order: usize) -> SurfaceJet {
         match &self.weights {

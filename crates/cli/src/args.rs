@@ -3,6 +3,7 @@
 
 use crate::failure::Failure;
 use crate::outcome::Outcome;
+use crate::stdout::STDOUT;
 use geom_core::Budget;
 use std::num::NonZeroUsize;
 use std::path::{Path, PathBuf};
@@ -10,7 +11,7 @@ use std::path::{Path, PathBuf};
 /// Honoured by every command.
 #[derive(Debug, clap::Args)]
 pub(crate) struct GlobalArgs {
-    /// Write status and measured numbers to this JSON file
+    /// Write status and measured numbers to this JSON file, `-` for standard output
     #[arg(long, value_name = "FILE.json", global = true)]
     pub(crate) metrics: Option<PathBuf>,
     /// Number of threads (default: one per core); results do not depend on it
@@ -66,10 +67,10 @@ impl OutputArgs {
 /// `--report` and `--figures`, for commands that make them.
 #[derive(Debug, clap::Args)]
 pub(crate) struct ReportArgs {
-    /// Write a report with a 3D view that opens offline
+    /// Write a report with a 3D view that opens offline; `-` for standard output
     #[arg(long, value_name = "FILE.html")]
     pub(crate) report: Option<PathBuf>,
-    /// Write plots (SVG) and pictures (PNG) into this existing folder
+    /// Write plots (SVG) and pictures (PNG) into this folder, which is made if need be
     #[arg(long, value_name = "DIR")]
     pub(crate) figures: Option<PathBuf>,
 }
@@ -81,7 +82,7 @@ impl ReportArgs {
             check_output_path(path)?;
         }
         match &self.figures {
-            Some(folder) => check_output_path(&folder.join("figure.svg")),
+            Some(folder) => check_output_folder(folder),
             None => Ok(()),
         }
     }
@@ -98,7 +99,8 @@ pub(crate) struct ConfigArgs {
 /// `--dump-system`, for methods that linearise.
 #[derive(Debug, clap::Args)]
 pub(crate) struct SystemArgs {
-    /// Write the linearised system of every stage into this existing folder (Matrix Market)
+    /// Write the linearised system of every stage into this folder (Matrix Market),
+    /// which is made if need be
     #[arg(long, value_name = "DIR")]
     pub(crate) dump_system: Option<PathBuf>,
 }
@@ -124,5 +126,13 @@ impl EndingArgs {
 
 /// Whether a file could be written at `path`: its folder is there and takes files.
 pub(crate) fn check_output_path(path: &Path) -> Result<(), Failure> {
+    if path == Path::new(STDOUT) {
+        return Ok(());
+    }
     exchange::check_writable(path).map_err(|e| Failure::input(path, e))
+}
+
+/// Whether files could be written into this folder, which may have to be made first.
+pub(crate) fn check_output_folder(folder: &Path) -> Result<(), Failure> {
+    exchange::check_folder(folder).map_err(|e| Failure::input(folder, e))
 }

@@ -62,3 +62,12 @@ pub(crate) fn refused(error: report::ReportError) -> Failure {
 pub(crate) fn say(message: &str) {
     let _ = writeln!(std::io::stderr().lock(), "umbilic: {message}");
 }
+
+/// Two results for one file.
+pub(crate) fn twice(path: &Path, other: &Path) -> Failure {
+    let message = "two results would be written to this file; name another for one";
+    if path == other {
+        return Failure::usage(format!("{}: {message}", path.display()));
+    }
+    Failure::usage(format!("{} and {}: {message}", other.display(), path.display()))
+}

@@ -14,6 +14,7 @@ use std::time::{Duration, Instant};
 use gp_solver::Checkpoint;
 
 use crate::checkpoints::Kept;
+use crate::choice::Choice;
 use crate::failure::{Failure, INTERRUPTED, say};
 use crate::outcome::{Outcome, Status};
 
@@ -37,6 +38,7 @@ pub(crate) struct Run {
     pub(crate) command: &'static str,
     pub(crate) begin: Instant,
     pub(crate) threads: usize,
+    pub(crate) choice: Choice,
     pub(crate) metrics: Option<PathBuf>,
     pub(crate) quiet: bool,
 }
@@ -174,7 +176,7 @@ impl Desk {
         let run = self.run.as_ref()?;
         let path = run.metrics.clone()?;
         let seconds = run.begin.elapsed().as_secs_f64();
-        Some((path, outcome.metrics_file(run.command, seconds, run.threads)))
+        Some((path, outcome.metrics_file(run.command, seconds, run.threads, &run.choice)))
     }
 
     /// Says that the run was interrupted, and how it goes on.

@@ -6,24 +6,30 @@
 
 mod args;
 mod checkpoints;
+mod choice;
 mod commands;
 mod config;
 mod context;
 mod failure;
 mod input_file;
 mod interrupt;
+mod limits;
 mod net_files;
 mod net_report;
 mod option_flags;
 mod outcome;
 mod panel_files;
+mod paths;
 mod report_support;
+mod stdout;
 mod watch;
+mod written;
 
-use clap::{CommandFactory, Parser};
+use clap::{CommandFactory, FromArgMatches, Parser};
 use context::Context;
 use failure::{DEFECT, FAILED, Failure, INTERRUPTED, NOT_CONVERGED, OK, USAGE, say};
 use outcome::{Outcome, Status};
+use paths::Paths;
 use std::io::Write;
 use std::process::ExitCode;
 use std::time::Instant;
@@ -58,16 +64,31 @@ pub fn main() -> ExitCode {
 }
 
 fn start() -> u8 {
-    let cli = match Cli::try_parse() {
-        Ok(cli) => cli,
+    let parsed = Cli::command().try_get_matches().and_then(|matches| {
+        Ok((Paths::of(&Cli::command(), &matches), Cli::from_arg_matches(&matches)?))
+    });
+    let (paths, cli) = match parsed {
+        Ok(parsed) => parsed,
         Err(error) => {
             // `--help` and `--version` come here too; clap prints them to stdout.
-            let _ = error.print();
-            return if error.use_stderr() { USAGE } else { OK };
+            let printed = error.print();
+            if error.use_stderr() {
+                return USAGE;
+            }
+            return match stdout::judged(printed) {
+                Ok(()) => OK,
+                Err(failure) => {
+                    say(&failure.to_string());
+                    failure.code()
+                }
+            };
         }
     };
-    let result =
-        Context::new(&cli.global).and_then(|context| run(&cli.global, &context, cli.command));
+    let result = paths
+        .check()
+        .and_then(|()| limits::heed_file_size())
+        .and_then(|()| Context::new(&cli.global))
+        .and_then(|context| run(&cli.global, &paths, &context, cli.command));
     result.unwrap_or_else(|failure| {
         say(&failure.to_string());
         failure.code()
@@ -76,6 +97,7 @@ fn start() -> u8 {
 
 fn run(
     global: &args::GlobalArgs,
+    paths: &Paths,
     context: &Context,
     command: commands::Command,
 ) -> Result<u8, Failure> {
@@ -87,16 +109,18 @@ fn run(
         command: command.name(),
         begin,
         threads: context.threads,
+        choice: paths.choice.clone(),
         metrics: global.metrics.clone(),
         quiet: global.quiet,
     });
     let outcome = command.run(context)?;
-    write(outcome, &context.interrupt, global.quiet)
+    write(outcome, paths, &context.interrupt, global.quiet)
 }
 
 /// Writes and prints what a command has found, or what there is of it after Ctrl-C.
 fn write(
     mut outcome: Outcome,
+    paths: &Paths,
     interrupt: &interrupt::Interrupt,
     quiet: bool,
 ) -> Result<u8, Failure> {
@@ -110,6 +134,8 @@ fn write(
     if interrupt.is_wanted() {
         outcome.status = Status::Interrupted;
     }
+    paths.check_results(&outcome)?;
+    paths.make_folders(&outcome)?;
     let is_over = outcome.status == Status::Interrupted;
     let is_stopped = || !is_over && interrupt.is_wanted();
     if !outcome.write_files(desk.metrics_of(&outcome), &is_stopped)? {
@@ -117,10 +143,12 @@ fn write(
         outcome.write_files(desk.metrics_of(&outcome), &|| false)?;
     }
     if !quiet {
-        let mut out = std::io::stdout().lock();
-        for line in &outcome.summary {
-            // A closed pipe (`umbilic … | head`) is the reader's choice, not an error.
-            let _ = writeln!(out, "{line}");
+        let summary: String = outcome.summary.iter().map(|line| format!("{line}\n")).collect();
+        if paths.use_stdout() {
+            // Standard output holds a result; people read the rest beside it.
+            let _ = std::io::stderr().lock().write_all(summary.as_bytes());
+        } else {
+            stdout::write(summary.as_bytes())?;
         }
     }
     if outcome.status == Status::Interrupted {
@@ -133,6 +161,7 @@ fn write(
 
 fn exit_code(outcome: &Outcome) -> u8 {
     match outcome.status {
+        _ if outcome.differs => DEFECT,
         Status::Interrupted => INTERRUPTED,
         Status::Converged => OK,
         Status::Failed => FAILED,

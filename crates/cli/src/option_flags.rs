@@ -44,6 +44,20 @@ impl<O: Fields> OptionFlags<O> {
         Ok(options)
     }
 
+    /// What a library says of the options: of a flag, or of the file the option comes from.
+    pub(crate) fn refused(&self, config: &ConfigArgs, error: impl fmt::Display) -> Failure {
+        let said = error.to_string();
+        let named = O::FIELDS.iter().find(|field| said.contains(&format!("`{}`", field.name)));
+        let is_flag = match named {
+            Some(field) => self.given.iter().any(|(given, _)| given.name == field.name),
+            None => !self.given.is_empty(),
+        };
+        match &config.config {
+            Some(file) if !is_flag => Failure::input(file, said),
+            _ => Failure::usage(in_flags::<O>(&said)),
+        }
+    }
+
     /// The file given in place of a value, for options that take one.
     pub(crate) fn file(&self, name: &str) -> Option<&Path> {
         let given =

@@ -1,6 +1,8 @@
 //! What a command hands back: files still in memory, numbers, and a summary.
 
-use crate::failure::Failure;
+use crate::choice::Choice;
+use crate::failure::{Failure, twice};
+use crate::stdout::{self, STDOUT};
 use exchange::Model;
 use serde::Serialize;
 use std::path::{Path, PathBuf};
@@ -32,6 +34,8 @@ pub(crate) struct Outcome {
     pub(crate) require_converged: bool,
     /// Whether the files of a failed result are written.
     pub(crate) keep_failed: bool,
+    /// Whether a file is not what a run says of it, which exits with code 1.
+    pub(crate) differs: bool,
 }
 
 impl Outcome {
@@ -49,6 +53,7 @@ impl Outcome {
             warnings: Vec::new(),
             require_converged: false,
             keep_failed: false,
+            differs: false,
         }
     }
 
@@ -77,7 +82,13 @@ impl Outcome {
     }
 
     /// The bytes of the metrics file.
-    pub(crate) fn metrics_file(&self, command: &str, seconds: f64, threads: usize) -> Vec<u8> {
+    pub(crate) fn metrics_file(
+        &self,
+        command: &str,
+        seconds: f64,
+        threads: usize,
+        choice: &Choice,
+    ) -> Vec<u8> {
         let file = MetricsFile {
             schema: 1,
             command,
@@ -85,6 +96,7 @@ impl Outcome {
             iterations: self.iterations,
             seconds,
             threads,
+            choice,
             input: self.input.as_deref().map(|p| p.display().to_string()),
             outputs: self.written().map(|(path, _)| path.display().to_string()).collect(),
             metrics: &self.metrics,
@@ -95,28 +107,33 @@ impl Outcome {
         bytes
     }
 
-    /// Writes all files, or none of them if `is_stopped` says so meanwhile; returns whether they
-    /// were written.
+    /// Writes all files, or none of them if `is_stopped` says so meanwhile; then what goes to
+    /// standard output. Returns whether they were written.
     pub(crate) fn write_files(
         &self,
         metrics: Option<(PathBuf, Vec<u8>)>,
         is_stopped: &dyn Fn() -> bool,
     ) -> Result<bool, Failure> {
-        let files: Vec<(&Path, &[u8])> = self
+        let (streams, files): (Vec<_>, Vec<_>) = self
             .written()
             .chain(metrics.as_ref())
             .map(|(path, bytes)| (path.as_path(), bytes.as_slice()))
-            .collect();
+            .partition(|(path, _)| *path == Path::new(STDOUT));
         for (k, (path, _)) in files.iter().enumerate() {
-            if files[..k].iter().any(|(other, _)| is_same_file(path, other)) {
-                let message = "two results would be written to this file; name another for one";
-                return Err(Failure::usage(format!("{}: {message}", path.display())));
+            let same = |(other, _): &&(&Path, &[u8])| exchange::is_same_file(path, other);
+            if let Some((other, _)) = files[..k].iter().find(same) {
+                return Err(twice(path, other));
             }
         }
-        exchange::write_files_unless(&files, is_stopped).map_err(Failure::usage)
+        if !exchange::write_files_unless(&files, is_stopped).map_err(Failure::usage)? {
+            return Ok(false);
+        }
+        streams.iter().try_for_each(|(_, bytes)| stdout::write(bytes))?;
+        Ok(true)
     }
 
-    fn written(&self) -> impl Iterator<Item = &(PathBuf, Vec<u8>)> {
+    /// What is written of a result with this status.
+    pub(crate) fn written(&self) -> impl Iterator<Item = &(PathBuf, Vec<u8>)> {
         let nothing: &[(PathBuf, Vec<u8>)] = &[];
         let (files, pages) = match self.status {
             Status::Interrupted => (nothing, nothing),
@@ -127,16 +144,6 @@ impl Outcome {
     }
 }
 
-/// Whether both names lead to one file, which need not exist yet.
-fn is_same_file(a: &Path, b: &Path) -> bool {
-    let place = |path: &Path| {
-        let folder = path.parent().filter(|f| !f.as_os_str().is_empty());
-        let folder = folder.unwrap_or(Path::new(".")).canonicalize().ok();
-        folder.map(|folder| (folder, path.file_name().map(ToOwned::to_owned)))
-    };
-    a.file_name() == b.file_name() && (a == b || place(a).is_some() && place(a) == place(b))
-}
-
 #[derive(Serialize)]
 struct MetricsFile<'a> {
     schema: u32,
@@ -145,6 +152,8 @@ struct MetricsFile<'a> {
     iterations: usize,
     seconds: f64,
     threads: usize,
+    #[serde(flatten)]
+    choice: &'a Choice,
     input: Option<String>,
     outputs: Vec<String>,
     metrics: &'a serde_json::Value,

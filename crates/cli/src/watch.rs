@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 
 use gp_solver::{Checkpoint, Observer, Progress, SolverError};
 
-use crate::args::check_output_path;
+use crate::args::check_output_folder;
 use crate::checkpoints::{CheckpointArgs, Resumed};
 use crate::context::{self, Context};
 use crate::failure::Failure;
@@ -61,7 +61,7 @@ impl<'c> Watch<'c> {
     /// Writes the system every stage begins with into this folder.
     pub(crate) fn with_systems(mut self, folder: Option<&Path>) -> Result<Self, Failure> {
         if let Some(folder) = folder {
-            check_output_path(&folder.join("jacobian.mtx"))?;
+            check_output_folder(folder)?;
         }
         self.dump = folder.map(Path::to_path_buf);
         Ok(self)

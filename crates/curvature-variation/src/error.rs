@@ -1,6 +1,6 @@
 //! Why a surface cannot be faired.
 
-use geom_core::MeshError;
+use geom_core::{MeshError, NormalizationError};
 use gp_solver::SolverError;
 use subdiv_catmull_clark::SubdivisionError;
 
@@ -85,6 +85,9 @@ pub enum Error {
     /// The surface cannot be evaluated.
     #[error(transparent)]
     Subdivision(#[from] SubdivisionError),
+    /// The mesh has no size, or stands too far away.
+    #[error(transparent)]
+    Normalization(#[from] NormalizationError),
     /// The solver refuses.
     #[error(transparent)]
     Solver(#[from] SolverError),

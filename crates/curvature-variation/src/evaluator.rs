@@ -81,6 +81,13 @@ pub struct EnergyTable {
 }
 
 impl EnergyTable {
+    /// The values when every length is `factor` times what it was.
+    pub(crate) fn scale_lengths(&mut self, factor: f64) {
+        for (functional, value) in &mut self.values {
+            *value *= factor.powi(functional.length_power());
+        }
+    }
+
     /// The value of a functional; for a weighted Mehlum-Tarrou energy from its two parts.
     #[must_use]
     pub fn get(&self, functional: Functional) -> f64 {

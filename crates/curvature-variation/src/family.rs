@@ -19,6 +19,7 @@ use crate::input::Input;
 use crate::level::LevelNumbers;
 use crate::metrics::{Measured, Meter};
 use crate::options::Options;
+use crate::placed::Placed;
 use crate::replay::{Answers, Offering, Replayed};
 use crate::solution::Solution;
 
@@ -83,17 +84,17 @@ pub(crate) fn problem(input: &Input, options: &Options) -> Result<Problem<'stati
 
 /// Minimises a functional among the control meshes `X + Σ cₖ (Yₖ − X)`.
 pub(crate) fn solve(
-    input: &Input,
-    options: &Options,
+    placed: &Placed<'_>,
     extra: Option<&mut Extra<'_, Error>>,
     observer: &mut dyn Observer,
 ) -> Result<Solution, Error> {
     let begin = Instant::now();
+    let Placed { input, options, .. } = placed;
     let family = Family::new(input, options)?;
     let Family { mesh, base, directions, surface } = &family;
     let (fingerprint, resume) = (input.fingerprint(options), observer.resume());
     let answers = Answers::resumed(fingerprint, resume.as_ref(), directions.len())?;
-    let stage = Stage::only("family");
+    let stage = placed.stage(Stage::only("family"));
     let (mut added, mut weight) = (None, 1.0);
     if let Some(extra) = extra {
         let mut problem = family.problem(options);

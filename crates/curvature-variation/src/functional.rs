@@ -95,10 +95,20 @@ impl Functional {
         }
     }
 
+    /// With which power of lengths the value grows.
+    #[must_use]
+    pub fn length_power(self) -> i32 {
+        match self {
+            Self::Area => 2,
+            Self::MeanCurvature => 1,
+            _ => 0,
+        }
+    }
+
     /// Whether scaling the surface leaves the value alone.
     #[must_use]
     pub fn is_scale_invariant(self) -> bool {
-        !matches!(self, Self::Area | Self::MeanCurvature)
+        self.length_power() == 0
     }
 
     /// Coefficients of the density, and whether its integral is multiplied by the area.

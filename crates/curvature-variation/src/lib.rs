@@ -45,6 +45,7 @@ mod limits;
 mod metric;
 mod metrics;
 mod options;
+mod placed;
 mod replay;
 mod rules;
 mod samples;

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::fmt;
 use std::time::Instant;
 
-use geom_core::{BoundingBox, PolyMesh};
+use geom_core::{BoundingBox, DVec3, FaceId, Normalization, PolyMesh};
 use gp_solver::{Observer, StageReport, Status};
 use serde::Serialize;
 use subdiv_catmull_clark::{Creases, SubdivisionSurface};
@@ -69,6 +69,24 @@ pub struct Metrics {
     /// Least and largest number of rings that smooth blends cover.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub blend_rings: Option<[usize; 2]>,
+    /// Mean of the control vertices.
+    pub vertex_centroid: [f64; 3],
+    /// `none`, or `some` if the surface has creases, which files do not hold.
+    pub creases: &'static str,
+    /// What [`Self::energies`] are of: `all` patches, or the `inner` ones, without those at a clamped
+    /// boundary.
+    pub energies_of: &'static str,
+    /// Patches are plain if no vertex of the boundary or of another valence than 4 is within so many
+    /// rings of them: bi-cubic B-splines on their 16 control points; none with creases.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub plain_rings: Option<usize>,
+    /// How many patches are plain.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub plain_patches: Option<usize>,
+    /// All functionals of these patches alone, by the normal quadrature: what can be recomputed from
+    /// the control mesh without the blends.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub plain_energies: Option<BTreeMap<&'static str, f64>>,
     /// Milliseconds of one energy and gradient of the whole result, the least of three.
     pub ms_per_gradient: f64,
     /// Peak resident memory in MB, for the program to fill in.
@@ -82,6 +100,23 @@ pub struct Metrics {
     /// All functionals, measured on the spline patches as they are written.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub written_energies: Option<BTreeMap<&'static str, f64>>,
+}
+
+impl Metrics {
+    /// The numbers of a surface in normalised coordinates as those of the model.
+    pub(crate) fn restore(&mut self, place: Normalization) {
+        let unit = place.scale().recip();
+        for table in std::iter::once(&mut self.energies).chain(&mut self.plain_energies) {
+            for functional in Functional::ALL {
+                if let Some(value) = table.get_mut(functional.name()) {
+                    *value *= unit.powi(functional.length_power());
+                }
+            }
+        }
+        self.torus_fit_rms = self.torus_fit_rms.map(|rms| rms * unit);
+        let centroid = place.restore(DVec3::from_array(self.vertex_centroid));
+        self.vertex_centroid = centroid.to_array();
+    }
 }
 
 /// What the user should know although there is a result.
@@ -200,6 +235,12 @@ impl Meter<'_> {
                 vertices: mesh.vertex_count(),
                 patches: mesh.face_count(),
                 blend_rings: surface.blend_rings(),
+                vertex_centroid: centroid(mesh),
+                creases: if creases.is_empty() { "none" } else { "some" },
+                energies_of: if self.clamps { "inner" } else { "all" },
+                plain_rings: None,
+                plain_patches: None,
+                plain_energies: None,
                 ms_per_gradient: f64::NAN,
                 peak_memory_mb: None,
                 fitted_patches: None,
@@ -252,6 +293,23 @@ impl Meter<'_> {
             let residual = gauss_bonnet_residual(mesh, surface, stop)?;
             out.metrics.gauss_bonnet_residual = residual.is_finite().then_some(residual);
         }
+        if creases.is_empty() {
+            let rings = surface.blend_rings().map_or(1, |[_, most]| most);
+            let plain = plain_patches(mesh, rings);
+            let count = plain.iter().filter(|c| **c > 0).count();
+            (out.metrics.plain_rings, out.metrics.plain_patches) = (Some(rings), Some(count));
+            if count > 0 {
+                let evaluator = SurfaceEnergy::with_multiplicities(
+                    surface,
+                    mesh.vertex_count(),
+                    Quadrature::NORMAL,
+                    &plain,
+                );
+                let (x, mut work) = (flatten(mesh.positions()), Workspace::default());
+                let table = evaluator.table_until(&x, &mut work, stop)?;
+                out.metrics.plain_energies = Some(table.by_name());
+            }
+        }
         out.metrics.ms_per_gradient = 1e3 * self.seconds_per_gradient(mesh, surface, stop)?;
         if stop() {
             return None;
@@ -284,6 +342,31 @@ impl Meter<'_> {
         }
         Some(least)
     }
+}
+
+fn centroid(mesh: &PolyMesh) -> [f64; 3] {
+    let sum: DVec3 = mesh.positions().iter().sum();
+    (sum / mesh.vertex_count().max(1) as f64).to_array()
+}
+
+/// 1 for every face with no vertex of the boundary or of another valence than 4 within `rings` rings
+/// of faces, 0 for the others.
+fn plain_patches(mesh: &PolyMesh, rings: usize) -> Vec<u32> {
+    let is_special = |v| mesh.is_boundary_vertex(v) || mesh.valence(v) != 4;
+    let mut reached: Vec<bool> = mesh.vertices().map(is_special).collect();
+    let mut plain = vec![1; mesh.face_count()];
+    for _ in 0..rings.max(1) {
+        let touched: Vec<FaceId> = mesh
+            .faces()
+            .filter(|f| plain[f.index()] > 0)
+            .filter(|f| mesh.face_vertices(*f).any(|v| reached[v.index()]))
+            .collect();
+        for f in touched {
+            plain[f.index()] = 0;
+            mesh.face_vertices(f).for_each(|v| reached[v.index()] = true);
+        }
+    }
+    plain
 }
 
 /// All energies of a surface, without the quads at the boundary if it is clamped; `None` once `stop`

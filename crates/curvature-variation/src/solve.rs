@@ -13,6 +13,7 @@ use crate::level::{Begin, LevelNumbers, solve_level};
 use crate::limits::{conditions, pulled_places, pulls};
 use crate::metrics::{Measured, Meter};
 use crate::options::Options;
+use crate::placed::Placed;
 use crate::schedule::Control;
 use crate::solution::Solution;
 use crate::variables::{control_points, fixed_vertices};
@@ -21,7 +22,8 @@ use crate::variables::{control_points, fixed_vertices};
 ///
 /// The mesh is refined until all faces are quads with regular rings around extraordinary
 /// vertices, minimised, refined and minimised again `levels` times. The result keeps the input's
-/// place and, where nothing holds it, the input's area. With further members the fairest mesh of
+/// place and, where nothing holds it, the input's area; it is faired around the origin and about one
+/// unit large, so that neither its place nor its unit matters. With further members the fairest mesh of
 /// their family is found instead, see [`Input::members`].
 ///
 /// Checkpoints are offered at the start of every level, after every Gauss-Newton step and after every
@@ -69,9 +71,9 @@ pub fn solve(
 /// let options = Options { levels: 0, iterations: 20, ..Options::default() };
 /// let torus = fixtures::quad_graphs::torus(10, 8, 1.0, 0.5);
 /// let place = 1.5 * torus.positions()[0];
-/// let mut pull = |_: &Stage, variables: &Variables, problem: &mut Problem<'_>| {
+/// let mut pull = |stage: &Stage, variables: &Variables, problem: &mut Problem<'_>| {
 ///     let mut block = PulledPoints::new(variables.group(CONTROL_POINTS)?);
-///     block.pull(&[(0, 1.0)], place, 1e5);
+///     block.pull(&[(0, 1.0)], stage.place(place.to_array()).into(), 1e5);
 ///     problem.add(block);
 ///     Ok(())
 /// };
@@ -104,6 +106,7 @@ pub fn solve_with(
 /// ```
 pub fn problem(input: &Input, options: &Options) -> Result<Problem<'static>, Error> {
     input.check(options)?;
+    let Placed { input, options, .. } = &Placed::new(input, options)?;
     if !input.members.is_empty() {
         return family::problem(input, options);
     }
@@ -124,11 +127,12 @@ fn run(
     observer: &mut dyn Observer,
 ) -> Result<Solution, Error> {
     input.check(options)?;
-    if input.members.is_empty() {
-        fair(input, options, extra, observer)
+    let placed = Placed::new(input, options)?;
+    placed.back(if input.members.is_empty() {
+        fair(&placed, extra, observer)
     } else {
-        family::solve(input, options, extra, observer)
-    }
+        family::solve(&placed, extra, observer)
+    })
 }
 
 /// What all levels share, with the energies before anything moved.
@@ -157,11 +161,11 @@ fn meter<'o>(input: &Input, options: &'o Options) -> Meter<'o> {
 }
 
 fn fair(
-    input: &Input,
-    options: &Options,
+    placed: &Placed<'_>,
     mut extra: Option<&mut Extra<'_, Error>>,
     observer: &mut dyn Observer,
 ) -> Result<Solution, Error> {
+    let Placed { input, options, .. } = placed;
     let fingerprint = input.fingerprint(options);
     let resume = observer.resume();
     if let Some(checkpoint) = &resume {
@@ -191,7 +195,8 @@ fn fair(
             let start = checkpoint.numbers("start", 3 * control.mesh.vertex_count())?;
             control.mesh.positions_mut().copy_from_slice(&unflatten(start));
         }
-        let stage = Stage::new(stage_name(control.mesh.vertex_count()), level, count);
+        let name = stage_name(control.mesh.vertex_count());
+        let stage = placed.stage(Stage::new(name, level, count));
         let frame = |state: Checkpoint| {
             let state = Checkpoint { method: METHOD.to_owned(), fingerprint, ..state };
             with_levels(state, &stages, &numbers)

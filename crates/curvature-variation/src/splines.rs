@@ -3,7 +3,7 @@
 use bspline::{
     BsplineSurface, Degree, FitError, KnotError, KnotVector, SplineError, fit_curve, fit_surface,
 };
-use geom_core::{DVec3, FaceId, PolyMesh};
+use geom_core::{DVec3, FaceId, Normalization, PolyMesh};
 use rayon::prelude::*;
 use std::collections::BTreeMap;
 use subdiv_catmull_clark::{BasisId, JetWeights, SubdivisionSurface};
@@ -70,13 +70,15 @@ pub fn spline_patches(
             rules.insert(patch.basis, FittedRule::new(surface, patch.basis)?);
         }
     }
-    let controls = surface.control_points(mesh.positions());
+    // Far from the origin fits and distances would lose digits.
+    let origin = Normalization::of(mesh.positions()).map_or(DVec3::ZERO, |place| place.center());
+    let positions: Vec<DVec3> = mesh.positions().iter().map(|&p| p - origin).collect();
+    let controls = surface.control_points(&positions);
     let patches: Vec<(FaceId, BsplineSurface, Option<f64>)> = surface
         .patches()
         .par_iter()
         .map(|patch| {
-            let positions = mesh.positions();
-            if let Some(points) = surface.bezier(positions, patch) {
+            if let Some(points) = surface.bezier(&positions, patch) {
                 let points = points.into_iter().flatten().collect();
                 let knots = bezier_knots.clone();
                 let exact = BsplineSurface::new(knots.clone(), knots, points, None)?;
@@ -91,7 +93,7 @@ pub fn spline_patches(
     Ok(SplinePatches {
         fitted: deviations.clone().count(),
         max_deviation: deviations.fold(0.0, f64::max),
-        surfaces: patches.into_iter().map(|(face, surface, _)| (face, surface)).collect(),
+        surfaces: patches.into_iter().map(|p| (p.0, p.1.translated(origin))).collect(),
     })
 }
 

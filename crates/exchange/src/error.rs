@@ -60,6 +60,17 @@ pub enum WriteError {
     /// The path names a folder, a device or a pipe.
     #[error("is not a regular file; name a file")]
     NotAFile,
+    /// A file in the place of a folder.
+    #[error("{path} is no folder; name another")]
+    NotAFolder { path: String },
+    /// An existing file that must not be changed.
+    #[error("is write-protected; make it writable or name another file")]
+    Protected,
+    /// An existing file whose owner the new one could not keep.
+    #[error(
+        "belongs to user {user}, group {group}, whom this user cannot give the new file to; remove it first or name another file"
+    )]
+    Owner { user: u32, group: u32 },
     /// The operating system refused.
     #[error("cannot be written ({reason}); check permissions and free space")]
     Io { reason: String },

@@ -1,8 +1,9 @@
 //! Reading whole files, and writing them so that a reader never sees half of one.
 
 use crate::error::{ReadError, WriteError};
+use crate::replaced::{check_unprotected, keep, temporary};
 use std::ffi::OsString;
-use std::fs::{self, File, OpenOptions};
+use std::fs::{self, File};
 use std::io::{Read, Write};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -61,7 +62,8 @@ pub fn check_writable(path: &Path) -> Result<(), WriteError> {
 
 /// Writes all files, or none of them: every one is first written to a temporary file in its own
 /// folder and flushed to the disk, then all are renamed into place. Existing files are replaced as
-/// a whole, so that at any moment a reader finds the old or the new content.
+/// a whole, so that at any moment a reader finds the old or the new content; the new file has the
+/// mode and the owner of the old one. A write-protected file is not replaced.
 ///
 /// # Errors
 /// [`WriteError::InFile`] names the file at fault. No target was touched, unless a rename itself
@@ -115,8 +117,12 @@ impl Prepared {
             Ok(meta) if meta.is_symlink() => fs::canonicalize(path)?,
             _ => path.to_path_buf(),
         };
-        if fs::metadata(&target).is_ok_and(|meta| !meta.is_file()) {
-            return Err(WriteError::NotAFile);
+        let old = fs::metadata(&target).ok();
+        if let Some(meta) = &old {
+            if !meta.is_file() {
+                return Err(WriteError::NotAFile);
+            }
+            check_unprotected(&target, meta)?;
         }
         let Some(name) = target.file_name() else { return Err(WriteError::NotAFile) };
         let folder = match target.parent() {
@@ -126,9 +132,13 @@ impl Prepared {
         if !folder.is_dir() {
             return Err(WriteError::NoFolder { folder: folder.display().to_string() });
         }
-        let temporary = folder.join(temporary_name(name));
-        let file = OpenOptions::new().write(true).create_new(true).open(&temporary)?;
-        Ok(Self { temporary, target, file, renamed: false })
+        let path = folder.join(temporary_name(name));
+        let file = temporary(&path, old.as_ref())?;
+        let prepared = Self { temporary: path, target, file, renamed: false };
+        if let Some(old) = &old {
+            keep(&prepared.file, old)?;
+        }
+        Ok(prepared)
     }
 
     /// Whether all of it was written and has reached the disk; not if `is_stopped`.

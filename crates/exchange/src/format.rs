@@ -88,7 +88,7 @@ pub fn decode_model(extension: &str, bytes: Vec<u8>) -> Result<Model, ReadError>
         "3dm" => read_3dm(&bytes),
         "obj" => read_obj(&into_text(bytes)?),
         "ply" => read_ply(&bytes),
-        "off" => read_off(&into_text(bytes)?).map(|mesh| of_mesh((mesh, Vec::new()))),
+        "off" => read_off(&into_text(bytes)?).map(of_mesh),
         "stl" => read_stl(&bytes).map(of_mesh),
         "glb" => read_glb(&bytes),
         "json" => read_json(&into_text(bytes)?),

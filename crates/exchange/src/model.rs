@@ -73,6 +73,19 @@ impl Model {
         Self { unit, surfaces, ..Self::default() }
     }
 
+    /// Mean of the control points of all surfaces, or, without surfaces, of the vertices of all
+    /// meshes; `None` for neither.
+    #[must_use]
+    pub fn centroid(&self) -> Option<DVec3> {
+        let nets = self.surfaces.iter().flat_map(|s| s.surface.control_points());
+        let vertices = self.meshes.iter().flat_map(|m| &m.positions);
+        let mean = |points: &mut dyn Iterator<Item = &DVec3>| {
+            let (sum, count) = points.fold((DVec3::ZERO, 0.0), |(s, n), p| (s + *p, n + 1.0));
+            (count > 0.0).then(|| sum / count)
+        };
+        if self.surfaces.is_empty() { mean(&mut { vertices }) } else { mean(&mut { nets }) }
+    }
+
     /// One mesh, nothing else.
     #[must_use]
     pub fn of_mesh(mesh: Mesh, unit: LengthUnit) -> Self {

@@ -311,9 +311,10 @@ fn indices(text: &mut String, keyword: &str, list: &[u32], base: usize) {
     text.push('\n');
 }
 
-/// A name must not break the line it stands on.
+/// A name must not break the line it stands on, nor steer the terminal it is shown in.
 pub(crate) fn one_line(name: &str) -> String {
-    name.split_whitespace().collect::<Vec<_>>().join(" ").replace('#', "_")
+    let words = name.split_whitespace().collect::<Vec<_>>().join(" ");
+    words.chars().map(|c| if c == '#' || c.is_control() { '_' } else { c }).collect()
 }
 
 #[cfg(test)]
@@ -339,6 +340,18 @@ mod tests {
         assert!(materials.starts_with("newmtl left\nKd 0.0000 0.4470 0.6980\nnewmtl right\nKd "));
         assert_eq!(read_obj(&with).unwrap(), model);
         assert_eq!(read_obj(&written).unwrap(), model);
+    }
+
+    #[test]
+    fn names_carry_no_control_characters() {
+        let name = "a\0b\u{1b}[31m\r\nv 0 0 0\u{85}c\u{7f}";
+        assert_eq!(one_line(name), "a_b_[31m v 0 0 0 c_");
+        let named = Mesh { name: name.to_owned(), ..Mesh::default() };
+        let text = write_obj(std::slice::from_ref(&named));
+        assert_eq!(text, "o a_b_[31m v 0 0 0 c_\n");
+        let ply = crate::write_ply(&[named], &crate::LengthUnit::default());
+        assert!(ply.iter().take_while(|b| **b != 0).all(|b| *b == b'\n' || !b.is_ascii_control()));
+        assert!(String::from_utf8_lossy(&ply).contains("comment name a_b_[31m v 0 0 0 c_\n"));
     }
 
     #[test]

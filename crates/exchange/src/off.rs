@@ -6,11 +6,11 @@ use crate::text_number::coordinate;
 use geom_core::DVec3;
 
 /// Reads an OFF file (also `COFF`, `NOFF`, `STOFF` and their combinations: extra numbers of
-/// vertices and colours of faces are skipped).
+/// vertices and colours of faces are skipped), and what to say of lines after the last face.
 ///
 /// # Errors
 /// [`ReadError::Text`] names the first line at fault.
-pub fn read_off(text: &str) -> Result<Mesh, ReadError> {
+pub fn read_off(text: &str) -> Result<(Mesh, Vec<String>), ReadError> {
     let mut lines = text
         .lines()
         .enumerate()
@@ -84,7 +84,9 @@ pub fn read_off(text: &str) -> Result<Mesh, ReadError> {
     if mesh.positions.is_empty() {
         return Err(ReadError::content("the file has no vertex", "export it again"));
     }
-    Ok(mesh)
+    let rest = lines.next();
+    let warning = |(line, _)| format!("line {line}: what follows the last face is left out");
+    Ok((mesh, rest.map(warning).into_iter().collect()))
 }
 
 /// The words of one vertex or face, which may run on over lines; what is left of its last line
@@ -121,11 +123,14 @@ mod tests {
     fn mixed_polygons_comments_and_colours() {
         let text = "COFF # a comment\n\n5 2 0\n0 0 0 1 0 0 1\n1 0 0\n1 1 0\n0 1 0\n0.5 2 1\n\
                     4 0 1 2 3 255 0 0\n3  3 2 4\n";
-        let mesh = read_off(text).unwrap();
+        let (mesh, warnings) = read_off(text).unwrap();
+        assert!(warnings.is_empty());
+        let (_, warnings) = read_off(&format!("{text}# fine\n\n4 0 1 2 3\n")).unwrap();
+        assert_eq!(warnings, ["line 13: what follows the last face is left out"]);
         assert_eq!(mesh.positions[4], DVec3::new(0.5, 2.0, 1.0));
         assert_eq!(mesh.faces.iter().collect::<Vec<_>>(), [&[0, 1, 2, 3][..], &[3, 2, 4]]);
         assert!(read_off("OFF 1 0 0\n1 2 3\n").is_ok());
-        let over_lines = read_off("OFF\n3 1 0\n0\n0 0\n1 0 0\n0 1\n0\n3 0\n1\n2\n").unwrap();
+        let (over_lines, _) = read_off("OFF\n3 1 0\n0\n0 0\n1 0 0\n0 1\n0\n3 0\n1\n2\n").unwrap();
         assert_eq!(over_lines.positions[2], DVec3::Y);
         assert_eq!(over_lines.faces.get(0), [0, 1, 2]);
     }

@@ -374,7 +374,7 @@ mod tests {
                 ("[(0, 0, 0), (0, 1, 0)]", "[(0, 0, 0)]"),
                 "surface `s`: row 2 of the control points has 2 entries and row 1 has 1",
             ),
-            (("(1, 1, 1)", "(1, NaN, 1)"), "surface `s`: control point 3 is [1, NaN, 1]"),
+            (("(1, 1, 1)", "(1, NaN, 1)"), "line 1: column 114: `NaN` is not a finite number"),
             (("name:", "nam:"), "line 1: column 14"),
             (("(surfaces", "(unit: \"ell\", surfaces"), "`ell` is not a unit of length; use mm"),
             (

@@ -23,6 +23,13 @@ pub fn read_stl(bytes: &[u8]) -> Result<(Mesh, Vec<String>), ReadError> {
         // Some programs begin binary files with `solid` too, so the size decides.
         Some(n) if bytes.len() == HEADER + 4 + n * TRIANGLE => soup.read_binary(bytes)?,
         _ if is_ascii => soup.read_ascii(&String::from_utf8_lossy(bytes))?,
+        Some(n) if n > 0 && bytes.len() > HEADER + 4 + n * TRIANGLE => {
+            let end = HEADER + 4 + n * TRIANGLE;
+            soup.read_binary(&bytes[..end])?;
+            let rest = bytes.len() - end;
+            soup.warnings
+                .push(format!("byte {end}: the {rest} bytes after the last triangle are left out"));
+        }
         Some(n) => {
             let fits = (bytes.len() - HEADER - 4) / TRIANGLE;
             let what = format!("{n} triangles are announced, the file has bytes for {fits}");
@@ -37,8 +44,10 @@ pub fn read_stl(bytes: &[u8]) -> Result<(Mesh, Vec<String>), ReadError> {
         return Err(ReadError::content("the file has no triangle", "export it again"));
     }
     let dropped = soup.dropped;
-    let warning = || format!("{dropped} triangles with two equal corners are left out");
-    Ok((soup.mesh, (dropped > 0).then(warning).into_iter().collect()))
+    if dropped > 0 {
+        soup.warnings.push(format!("{dropped} triangles with two equal corners are left out"));
+    }
+    Ok((soup.mesh, soup.warnings))
 }
 
 #[derive(Default)]
@@ -46,6 +55,7 @@ struct Soup {
     mesh: Mesh,
     ids: HashMap<[u64; 3], u32>,
     dropped: usize,
+    warnings: Vec<String>,
 }
 
 impl Soup {

@@ -2,7 +2,7 @@
 
 #![allow(clippy::unwrap_used, reason = "a test may stop at the first surprise")]
 
-use exchange::{LengthUnit, Mesh, read_glb, write_glb};
+use exchange::{Group, LengthUnit, Mesh, read_glb, write_glb};
 use geom_core::{DVec3, assert_close};
 use serde_json::{Value, json};
 
@@ -130,6 +130,20 @@ fn instances_that_outgrow_the_budget_are_refused_before_they_are_built() {
         "the scene places its meshes 3000 times, which takes 206 MB where 32 are allowed; export \
          every mesh once, or fewer instances"
     );
+}
+
+#[test]
+fn groups_of_one_mesh_count_their_common_vertices_once() {
+    let (groups, vertices) = (200_u32, 20_000_u32);
+    let at = |k: u32| f64::from(k);
+    let positions = (0..vertices).map(|k| DVec3::new(at(k), at(k % 7), at(k % 3))).collect();
+    let faces: Vec<[u32; 3]> = (0..groups).map(|k| [k, k + 1, k + 2]).collect();
+    let mut mesh = Mesh::new(positions, faces.iter().map(|f| &f[..]));
+    mesh.groups = (0..groups).map(|k| Group::new(format!("mold {k}"))).collect();
+    mesh.face_groups = (0..groups).collect();
+    let model = read_glb(&write_glb(&[mesh], &LengthUnit::Metre)).unwrap();
+    let [read] = &model.meshes[..] else { panic!("one mesh") };
+    assert_eq!((read.groups.len(), read.faces.len()), (200, 200));
 }
 
 #[test]

@@ -103,7 +103,11 @@ proptest! {
         for file in ["a.ron", "a.step"] {
             let back = again(file, &model);
             prop_assert_eq!(&back.unit, &model.unit, "{}", file);
-            prop_assert_eq!(bits(&back.surfaces[0].surface), bits(&model.surfaces[0].surface), "{}", file);
+            let (found, wanted) = (bits(&back.surfaces[0].surface), &model.surfaces[0].surface);
+            // STEP wants the normals of a closed shell outside: its parameters may be swapped.
+            let closed = wanted.knots_u().is_periodic() && wanted.knots_v().is_periodic();
+            let turned = closed && file == "a.step" && found == bits(&wanted.swapped());
+            prop_assert!(turned || found == bits(wanted), "{}: {:?}", file, found);
             prop_assert_eq!(&back.surfaces[0].name, "roof");
         }
     }
@@ -119,6 +123,9 @@ proptest! {
 
     #[test]
     fn surfaces_come_back_from_rhino(surface in surface(true)) {
+        // Rhino has no periodic polylines: the outer knots that make one are not in the file.
+        let straight = |k: &KnotVector| k.is_periodic() && k.degree().get() == 1;
+        prop_assume!(!straight(surface.knots_u()) && !straight(surface.knots_v()));
         let model = Model::of_surface("roof", surface, LengthUnit::Foot);
         let back = again("a.3dm", &model);
         prop_assert_eq!(&back.unit, &model.unit);

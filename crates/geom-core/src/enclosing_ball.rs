@@ -77,6 +77,8 @@ impl Ball {
 /// The smallest ball around at most five points, and the points on it that span it.
 fn smallest(points: &[DVec3]) -> (Ball, Vec<DVec3>) {
     let mut best: Option<(Ball, Vec<DVec3>)> = None;
+    // Where rounding leaves a point out of every ball, the one that has to grow least holds all.
+    let mut widened: Option<(Ball, Vec<DVec3>)> = None;
     for subset in 1_usize..1 << points.len() {
         if subset.count_ones() > 4 {
             continue;
@@ -84,18 +86,19 @@ fn smallest(points: &[DVec3]) -> (Ball, Vec<DVec3>) {
         let chosen: Vec<DVec3> =
             (0..points.len()).filter(|k| subset >> k & 1 == 1).map(|k| points[k]).collect();
         let Some(ball) = through(&chosen) else { continue };
-        let holds = |p: &DVec3| p.distance(ball.center) <= ball.radius * (1.0 + 0.1 * ROUNDING);
-        let is_smaller = best.as_ref().is_none_or(|(b, _)| ball.radius < b.radius);
-        if is_smaller && points.iter().all(holds) {
-            best = Some((ball, chosen));
+        let far = points.iter().map(|p| p.distance(ball.center)).fold(0.0, f64::max);
+        let is_smaller = |than: &Option<(Ball, Vec<DVec3>)>, radius: f64| {
+            than.as_ref().is_none_or(|(b, _)| radius < b.radius)
+        };
+        if far <= ball.radius * (1.0 + 0.1 * ROUNDING) {
+            if is_smaller(&best, ball.radius) {
+                best = Some((ball, chosen));
+            }
+        } else if best.is_none() && is_smaller(&widened, far) {
+            widened = Some((Ball { radius: far, ..ball }, chosen));
         }
     }
-    best.unwrap_or_else(|| {
-        // Points so nearly in line or in a circle that no subset holds the others to rounding.
-        let center = points.iter().sum::<DVec3>() / points.len() as f64;
-        let radius = points.iter().map(|p| p.distance(center)).fold(0.0, f64::max);
-        (Ball { center, radius }, points[..points.len().min(4)].to_vec())
-    })
+    best.or(widened).unwrap_or((Ball { center: points[0], radius: 0.0 }, points[..1].to_vec()))
 }
 
 /// The smallest ball with all of one to four points on it; `None` if they are in line or in a
@@ -160,6 +163,22 @@ mod tests {
                 }
             }
             assert_close(ball.radius, least, 1e-11 * least);
+        }
+    }
+
+    #[test]
+    fn rounding_makes_no_ball_larger() {
+        // Rings of points on one sphere, which no four of them hold to the last bit.
+        for count in 5..60 {
+            let ring = |k: usize| {
+                let (around, up) = (0.37 * k as f64, 1.3 * (k as f64 * 0.618_034).fract() - 0.65);
+                let out = (1.0_f64 - up * up).sqrt();
+                DVec3::new(out * around.cos(), out * around.sin(), up)
+            };
+            let points: Vec<_> = (0..200 * count).map(ring).collect();
+            let ball = Ball::around(&points).unwrap();
+            assert!(ball.radius <= 1.0 + 1e-13, "{count}: {}", ball.radius);
+            assert!(points.iter().all(|p| p.distance(ball.center) <= ball.radius * (1.0 + 1e-12)));
         }
     }
 

@@ -9,6 +9,7 @@ mod curvature_derivatives;
 mod curvature_statistics;
 mod enclosing_ball;
 mod forms;
+mod half_edges;
 mod isolines;
 mod jet;
 mod jet_fit;
@@ -34,13 +35,14 @@ pub use forms::{
     normal_curvature, principal_curvatures,
 };
 pub use glam::{DMat3, DVec2, DVec3};
+pub use half_edges::MeshError;
 pub use isolines::{Isoline, isolines};
 pub use jet::SurfaceJet;
 pub use mesh_curvature::{VertexCurvature, mesh_curvature_statistics, vertex_curvatures};
 pub use mesh_repair::{coinciding_points, faces_to_turn};
 pub use normalization::{Normalization, NormalizationError};
 pub use numerics::assert_close;
-pub use poly_mesh::{FaceId, HalfEdgeId, MeshError, PolyMesh, VertexId};
+pub use poly_mesh::{FaceId, HalfEdgeId, PolyMesh, VertexId};
 pub use quad_grid::{GridError, QuadGrid};
 pub use third_order::{ThirdOrder, UmbilicKind};
 pub use torus_fit::Torus;

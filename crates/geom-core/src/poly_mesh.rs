@@ -1,7 +1,8 @@
 //! Polygon meshes: quads, triangles and larger faces, with or without boundary.
 
+use crate::half_edges::{Links, MeshError, NONE, check_faces};
 use glam::DVec3;
-use std::collections::HashMap;
+use std::sync::Arc;
 
 /// Index of a vertex of a [`PolyMesh`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
@@ -39,60 +40,6 @@ impl HalfEdgeId {
     }
 }
 
-/// Why a list of faces is not a mesh this crate can work on.
-///
-/// # Example
-/// ```
-/// use geom_core::{DVec3, PolyMesh};
-/// let corners = vec![DVec3::ZERO, DVec3::X, DVec3::Y, DVec3::Z];
-/// let fault = PolyMesh::new(corners, &[[0, 1, 2], [0, 1, 3]]).unwrap_err();
-/// assert_eq!(
-///     fault.to_string(),
-///     "faces 0 and 1 both run from vertex 0 to 1; \
-///      flip one of them so that all faces are oriented alike"
-/// );
-/// ```
-#[derive(Clone, Debug, PartialEq, thiserror::Error)]
-#[non_exhaustive]
-#[expect(missing_docs, reason = "the messages spell out every field")]
-pub enum MeshError {
-    /// A NaN or an infinity among the coordinates.
-    #[error("vertex {vertex} is ({x}, {y}, {z}); coordinates must be finite")]
-    NotFinite { vertex: usize, x: f64, y: f64, z: f64 },
-    /// A face with fewer than three corners.
-    #[error("face {face} has {corners} corners; a face needs at least 3")]
-    TooFewCorners { face: usize, corners: usize },
-    /// A face names a vertex that is not there.
-    #[error("face {face} names vertex {vertex}, but there are only {count}")]
-    NoSuchVertex { face: usize, vertex: usize, count: usize },
-    /// A face visits a vertex twice.
-    #[error("face {face} visits vertex {vertex} twice; drop or split the face")]
-    RepeatedCorner { face: usize, vertex: usize },
-    /// More than two faces share an edge.
-    #[error(
-        "edge {from}–{to} has more than 2 faces ({faces:?}); split the mesh there or drop one face"
-    )]
-    NonManifoldEdge { from: usize, to: usize, faces: Vec<usize> },
-    /// Two faces run along an edge in the same direction.
-    #[error(
-        "faces {first} and {second} both run from vertex {from} to {to}; flip one of them so that all faces are oriented alike"
-    )]
-    Flipped { from: usize, to: usize, first: usize, second: usize },
-    /// The faces at a vertex form more than one fan.
-    #[error("the faces at vertex {vertex} touch only at that vertex; split it in two")]
-    NonManifoldVertex { vertex: usize },
-    /// No face at all.
-    #[error("the mesh has no face")]
-    Empty,
-    /// More half-edges than 32-bit ids can count.
-    #[error("the mesh has {corners} face corners; at most 2^31 are supported")]
-    TooLarge { corners: usize },
-}
-
-const NONE: u32 = u32::MAX;
-/// How many faces of a non-manifold edge an error names.
-const NAMED_FACES: usize = 8;
-
 /// An oriented manifold polygon mesh as half-edges; vertices without a face are allowed.
 ///
 /// Half-edges of faces come first, face by face and in the order of its corners, so that
@@ -118,15 +65,8 @@ const NAMED_FACES: usize = 8;
 #[derive(Clone, Debug, PartialEq)]
 pub struct PolyMesh {
     positions: Vec<DVec3>,
-    origin: Vec<u32>,
-    next: Vec<u32>,
-    prev: Vec<u32>,
-    twin: Vec<u32>,
-    face: Vec<u32>,
-    face_start: Vec<u32>,
-    // For a boundary vertex the half-edge that leaves along the boundary loop, so that a ring
-    // walk that starts here sees every face of the fan once.
-    outgoing: Vec<u32>,
+    /// Shared by all copies of a mesh: a copy costs its positions.
+    links: Arc<Links>,
 }
 
 impl PolyMesh {
@@ -136,121 +76,8 @@ impl PolyMesh {
     /// [`MeshError`] names the first face, edge or vertex at fault.
     pub fn new<F: AsRef<[u32]>>(positions: Vec<DVec3>, faces: &[F]) -> Result<Self, MeshError> {
         check_faces(&positions, faces)?;
-        let corners: usize = faces.iter().map(|f| f.as_ref().len()).sum();
-        if corners > (u32::MAX / 2) as usize {
-            return Err(MeshError::TooLarge { corners });
-        }
-        let mut mesh = Self {
-            outgoing: vec![NONE; positions.len()],
-            positions,
-            origin: Vec::with_capacity(corners),
-            next: Vec::with_capacity(corners),
-            prev: Vec::with_capacity(corners),
-            twin: vec![NONE; corners],
-            face: Vec::with_capacity(corners),
-            face_start: Vec::with_capacity(faces.len() + 1),
-        };
-        mesh.push_faces(faces);
-        mesh.match_twins()?;
-        mesh.close_boundaries()?;
-        mesh.choose_outgoing()?;
-        Ok(mesh)
-    }
-
-    fn push_faces<F: AsRef<[u32]>>(&mut self, faces: &[F]) {
-        for (f, corners) in faces.iter().enumerate() {
-            let corners = corners.as_ref();
-            let (start, n) = (self.origin.len() as u32, corners.len() as u32);
-            self.face_start.push(start);
-            for k in 0..n {
-                self.origin.push(corners[k as usize]);
-                self.next.push(start + (k + 1) % n);
-                self.prev.push(start + (k + n - 1) % n);
-                self.face.push(f as u32);
-            }
-        }
-        self.face_start.push(self.origin.len() as u32);
-    }
-
-    fn match_twins(&mut self) -> Result<(), MeshError> {
-        let mut by_ends: HashMap<(u32, u32), u32> = HashMap::with_capacity(self.origin.len());
-        for h in 0..self.origin.len() as u32 {
-            let ends = (self.origin[h as usize], self.origin[self.next[h as usize] as usize]);
-            if let Some(&other) = by_ends.get(&ends) {
-                return Err(self.edge_error(ends, other, h));
-            }
-            by_ends.insert(ends, h);
-        }
-        for h in 0..self.origin.len() {
-            let ends = (self.origin[self.next[h] as usize], self.origin[h]);
-            if let Some(&twin) = by_ends.get(&ends) {
-                self.twin[h] = twin;
-            }
-        }
-        Ok(())
-    }
-
-    /// Two faces run along `ends` in the same direction: one flipped face, or three on one edge.
-    fn edge_error(&self, ends: (u32, u32), first: u32, second: u32) -> MeshError {
-        let on_edge = |h: &usize| {
-            let (a, b) = (self.origin[*h], self.origin[self.next[*h] as usize]);
-            (a, b) == ends || (b, a) == ends
-        };
-        // A few are enough to find the place, however many there are.
-        let faces = (0..self.origin.len()).filter(on_edge).map(|h| self.face[h] as usize);
-        let faces: Vec<usize> = faces.take(NAMED_FACES).collect();
-        let (from, to) = (ends.0 as usize, ends.1 as usize);
-        if faces.len() > 2 {
-            return MeshError::NonManifoldEdge { from, to, faces };
-        }
-        let (first, second) = (self.face[first as usize], self.face[second as usize]);
-        MeshError::Flipped { from, to, first: first as usize, second: second as usize }
-    }
-
-    fn close_boundaries(&mut self) -> Result<(), MeshError> {
-        let inner = self.origin.len() as u32;
-        let mut leaving: HashMap<u32, u32> = HashMap::new();
-        for h in 0..inner {
-            if self.twin[h as usize] != NONE {
-                continue;
-            }
-            let b = self.origin.len() as u32;
-            let start = self.origin[self.next[h as usize] as usize];
-            self.origin.push(start);
-            self.face.push(NONE);
-            self.twin.push(h);
-            self.next.push(NONE);
-            self.prev.push(NONE);
-            self.twin[h as usize] = b;
-            if leaving.insert(start, b).is_some() {
-                return Err(MeshError::NonManifoldVertex { vertex: start as usize });
-            }
-        }
-        for b in inner..self.origin.len() as u32 {
-            let end = self.origin[self.twin[b as usize] as usize];
-            let next = leaving[&end];
-            self.next[b as usize] = next;
-            self.prev[next as usize] = b;
-        }
-        Ok(())
-    }
-
-    fn choose_outgoing(&mut self) -> Result<(), MeshError> {
-        let mut degree = vec![0_u32; self.positions.len()];
-        for h in 0..self.origin.len() {
-            let v = self.origin[h] as usize;
-            degree[v] += 1;
-            if self.outgoing[v] == NONE || self.face[h] == NONE {
-                self.outgoing[v] = h as u32;
-            }
-        }
-        for v in 0..self.positions.len() {
-            let reached = self.outgoing_half_edges(VertexId(v as u32)).count();
-            if reached != degree[v] as usize {
-                return Err(MeshError::NonManifoldVertex { vertex: v });
-            }
-        }
-        Ok(())
+        let links = Arc::new(Links::new(positions.len(), faces)?);
+        Ok(Self { positions, links })
     }
 
     /// Number of vertices.
@@ -262,19 +89,19 @@ impl PolyMesh {
     /// Number of faces.
     #[must_use]
     pub fn face_count(&self) -> usize {
-        self.face_start.len() - 1
+        self.links.face_start.len() - 1
     }
 
     /// Number of half-edges, those along the boundary included.
     #[must_use]
     pub fn half_edge_count(&self) -> usize {
-        self.origin.len()
+        self.links.origin.len()
     }
 
     /// Number of edges.
     #[must_use]
     pub fn edge_count(&self) -> usize {
-        self.origin.len() / 2
+        self.links.origin.len() / 2
     }
 
     /// Positions, indexed by vertex.
@@ -306,31 +133,33 @@ impl PolyMesh {
 
     /// One half-edge per edge: the one with the smaller index, so never one along the boundary.
     pub fn edges(&self) -> impl Iterator<Item = HalfEdgeId> + '_ {
-        (0..self.origin.len() as u32).filter(|&h| h < self.twin[h as usize]).map(HalfEdgeId)
+        (0..self.links.origin.len() as u32)
+            .filter(|&h| h < self.links.twin[h as usize])
+            .map(HalfEdgeId)
     }
 
     /// The next half-edge around the face or boundary loop.
     #[must_use]
     pub fn next(&self, h: HalfEdgeId) -> HalfEdgeId {
-        HalfEdgeId(self.next[h.index()])
+        HalfEdgeId(self.links.next[h.index()])
     }
 
     /// The previous half-edge around the face or boundary loop.
     #[must_use]
     pub fn prev(&self, h: HalfEdgeId) -> HalfEdgeId {
-        HalfEdgeId(self.prev[h.index()])
+        HalfEdgeId(self.links.prev[h.index()])
     }
 
     /// The half-edge of the same edge in the other direction.
     #[must_use]
     pub fn twin(&self, h: HalfEdgeId) -> HalfEdgeId {
-        HalfEdgeId(self.twin[h.index()])
+        HalfEdgeId(self.links.twin[h.index()])
     }
 
     /// The vertex the half-edge leaves.
     #[must_use]
     pub fn origin(&self, h: HalfEdgeId) -> VertexId {
-        VertexId(self.origin[h.index()])
+        VertexId(self.links.origin[h.index()])
     }
 
     /// The vertex the half-edge enters.
@@ -342,19 +171,19 @@ impl PolyMesh {
     /// The face on the left, or `None` along the boundary.
     #[must_use]
     pub fn face(&self, h: HalfEdgeId) -> Option<FaceId> {
-        let face = self.face[h.index()];
+        let face = self.links.face[h.index()];
         (face != NONE).then_some(FaceId(face))
     }
 
     /// The half-edge that leaves the first corner of a face.
     #[must_use]
     pub fn face_half_edge(&self, f: FaceId) -> HalfEdgeId {
-        HalfEdgeId(self.face_start[f.index()])
+        HalfEdgeId(self.links.face_start[f.index()])
     }
 
     /// Half-edges of a face, from its first corner on.
     pub fn face_half_edges(&self, f: FaceId) -> impl ExactSizeIterator<Item = HalfEdgeId> + use<> {
-        (self.face_start[f.index()]..self.face_start[f.index() + 1]).map(HalfEdgeId)
+        (self.links.face_start[f.index()]..self.links.face_start[f.index() + 1]).map(HalfEdgeId)
     }
 
     /// Corners of a face, in the order given to `new`.
@@ -370,14 +199,15 @@ impl PolyMesh {
     /// ```
     #[must_use]
     pub fn face_vertices(&self, f: FaceId) -> FaceCorners<'_> {
-        let range = self.face_start[f.index()] as usize..self.face_start[f.index() + 1] as usize;
-        FaceCorners(self.origin[range].iter())
+        let range = self.links.face_start[f.index()] as usize
+            ..self.links.face_start[f.index() + 1] as usize;
+        FaceCorners(self.links.origin[range].iter())
     }
 
     /// Number of corners of a face.
     #[must_use]
     pub fn face_degree(&self, f: FaceId) -> usize {
-        (self.face_start[f.index() + 1] - self.face_start[f.index()]) as usize
+        (self.links.face_start[f.index() + 1] - self.links.face_start[f.index()]) as usize
     }
 
     /// Whether every face has four corners.
@@ -390,7 +220,7 @@ impl PolyMesh {
     /// boundary it is the half-edge that leaves along the boundary loop.
     #[must_use]
     pub fn outgoing(&self, v: VertexId) -> Option<HalfEdgeId> {
-        let h = self.outgoing[v.index()];
+        let h = self.links.outgoing[v.index()];
         (h != NONE).then_some(HalfEdgeId(h))
     }
 
@@ -464,15 +294,15 @@ impl PolyMesh {
     /// The boundary loops, each as its half-edges in order (the surface on their right).
     #[must_use]
     pub fn boundary_loops(&self) -> Vec<Vec<HalfEdgeId>> {
-        let first_boundary = self.face_start[self.face_count()];
-        let mut seen = vec![false; self.origin.len() - first_boundary as usize];
+        let first_boundary = self.links.face_start[self.face_count()];
+        let mut seen = vec![false; self.links.origin.len() - first_boundary as usize];
         let mut loops = Vec::new();
-        for start in first_boundary..self.origin.len() as u32 {
+        for start in first_boundary..self.links.origin.len() as u32 {
             let mut walk = Vec::new();
             let mut at = start;
             while !std::mem::replace(&mut seen[(at - first_boundary) as usize], true) {
                 walk.push(HalfEdgeId(at));
-                at = self.next[at as usize];
+                at = self.links.next[at as usize];
             }
             if !walk.is_empty() {
                 loops.push(walk);
@@ -559,32 +389,6 @@ impl Iterator for FaceCorners<'_> {
 }
 
 impl ExactSizeIterator for FaceCorners<'_> {}
-
-fn check_faces<F: AsRef<[u32]>>(positions: &[DVec3], faces: &[F]) -> Result<(), MeshError> {
-    if let Some(vertex) = positions.iter().position(|p| !p.is_finite()) {
-        let DVec3 { x, y, z } = positions[vertex];
-        return Err(MeshError::NotFinite { vertex, x, y, z });
-    }
-    if faces.is_empty() {
-        return Err(MeshError::Empty);
-    }
-    for (face, corners) in faces.iter().enumerate() {
-        let corners = corners.as_ref();
-        if corners.len() < 3 {
-            return Err(MeshError::TooFewCorners { face, corners: corners.len() });
-        }
-        let mut sorted = corners.to_vec();
-        sorted.sort_unstable();
-        if let Some(pair) = sorted.windows(2).find(|pair| pair[0] == pair[1]) {
-            return Err(MeshError::RepeatedCorner { face, vertex: pair[0] as usize });
-        }
-        let largest = sorted[sorted.len() - 1] as usize;
-        if largest >= positions.len() {
-            return Err(MeshError::NoSuchVertex { face, vertex: largest, count: positions.len() });
-        }
-    }
-    Ok(())
-}
 
 #[cfg(test)]
 mod tests {

@@ -27,7 +27,8 @@ pub enum DampingRule {
     /// follows curved valleys and finds back from far starts.
     #[default]
     StepLength,
-    /// `D = diag A` of the iterate. After success `μ ← μ/5` if `ϱ > 1/2`, unchanged if `ϱ > 1/5`,
+    /// `D = diag A` of the iterate (of [vectors](crate::Variables::set_vectors) its mean over all
+    /// systems of axes). After success `μ ← μ/5` if `ϱ > 1/2`, unchanged if `ϱ > 1/5`,
     /// else `5μ/2`; after a refusal `μ ← 5μ`. For a stiff term whose diagonal changes much from
     /// step to step, where the largest one so far would slow the rest down.
     Fivefold,

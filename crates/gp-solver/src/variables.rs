@@ -339,8 +339,9 @@ impl Variables {
     }
 
     /// Says that the items of a group are points or vectors in space, whose components mean nothing
-    /// each by itself. They are damped by their block of the normal matrix, or alike, by the mean of
-    /// its diagonal, where the scaling is the largest so far; so a turned problem takes turned steps.
+    /// each by itself, so that a turned problem takes turned steps. With `B` the block of a vector
+    /// of `k` components in the normal matrix, it is damped by `(2 B + tr B I)/(k + 2)`, the mean of
+    /// `diag B` over all systems of axes; where the scaling is the largest so far by `tr B / k`.
     pub fn set_vectors(&mut self, group: Group) -> &mut Self {
         self.vectors.push(group);
         self

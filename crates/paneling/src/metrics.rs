@@ -19,12 +19,16 @@ pub struct Quality {
     pub kink_p95_deg: f64,
     /// The largest kink.
     pub kink_max_deg: f64,
+    /// Root mean square of the kinks.
+    pub kink_rms_deg: f64,
     /// Half of the gaps are at most this.
     pub gap_median: f64,
     /// 95 % of the gaps are at most this.
     pub gap_p95: f64,
     /// The largest gap.
     pub gap_max: f64,
+    /// Root mean square of the gaps.
+    pub gap_rms: f64,
     /// [`gap_median`](Self::gap_median) in percent.
     pub gap_median_percent: f64,
     /// [`gap_p95`](Self::gap_p95) in percent.
@@ -33,6 +37,8 @@ pub struct Quality {
     pub gap_max_percent: f64,
     /// The largest distance of any panel from the design, in percent.
     pub deviation_max_percent: f64,
+    /// Root mean square of the distances of all samples of the panels from the design, in percent.
+    pub deviation_rms_percent: f64,
     /// [`gap_median`](Self::gap_median) in percent of the box.
     pub gap_median_percent_box: f64,
     /// [`gap_p95`](Self::gap_p95) in percent of the box.
@@ -57,13 +63,16 @@ impl Quality {
             kink_median_deg: kinks.median.to_degrees(),
             kink_p95_deg: kinks.p95.to_degrees(),
             kink_max_deg: kinks.max.to_degrees(),
+            kink_rms_deg: kinks.rms.to_degrees(),
             gap_median: gaps.median,
             gap_p95: gaps.p95,
             gap_max: gaps.max,
+            gap_rms: gaps.rms,
             gap_median_percent: percent(gaps.median),
             gap_p95_percent: percent(gaps.p95),
             gap_max_percent: percent(gaps.max),
             deviation_max_percent: percent(deviation),
+            deviation_rms_percent: percent(paneling.measures.deviation_rms),
             gap_median_percent_box: of_box(gaps.median),
             gap_p95_percent_box: of_box(gaps.p95),
             gap_max_percent_box: of_box(gaps.max),

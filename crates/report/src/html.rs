@@ -2,12 +2,15 @@
 
 use std::fmt::Write as _;
 
+use base64::Engine as _;
+use base64::engine::general_purpose::STANDARD;
 use serde_json::{Map, Value, json};
 
 use crate::energies::energies_svg;
 use crate::histogram::histogram_svg;
 use crate::numbers::format_number;
 use crate::page_data::page_data;
+use crate::sha256::sha256;
 use crate::text::{escape, escape_script};
 use crate::{Report, SeamTable};
 
@@ -44,9 +47,17 @@ const SHADERS: [(&str, &str); 10] = [
     ("pick.frag", include_str!("viewer/glsl/pick.frag")),
 ];
 
-/// What a page may load: nothing but what stands in it.
-const POLICY: &str =
-    "default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; img-src data:";
+/// What a page may run and load: its own script and style, known by their hashes, and pictures that
+/// stand in it. Whatever else got into the page would stay text.
+fn policy(script: &str, style: &str) -> String {
+    let hash = |text: &str| STANDARD.encode(sha256(text.as_bytes()));
+    format!(
+        "default-src 'none'; script-src 'sha256-{}'; style-src 'sha256-{}'; img-src data:; \
+         base-uri 'none'; form-action 'none'",
+        hash(script),
+        hash(style)
+    )
+}
 
 impl Report {
     /// The whole page: text, data and viewer in one file that loads nothing else.
@@ -54,11 +65,13 @@ impl Report {
         let (metrics, run) = self.split_metrics();
         let data = page_data(self);
         let title = escape(&self.title);
+        let (script, style) = (script(), format!("\n{STYLE}"));
+        let policy = policy(&script, &style);
         let mut page = format!(
             "<!doctype html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n\
              <meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n\
-             <meta http-equiv=\"Content-Security-Policy\" content=\"{POLICY}\">\n\
-             <title>Loading {title}</title>\n<style>\n{STYLE}</style>\n</head>\n<body>\n"
+             <meta http-equiv=\"Content-Security-Policy\" content=\"{policy}\">\n\
+             <title>Loading {title}</title>\n<style>{style}</style>\n</head>\n<body>\n"
         );
         page += &self.head();
         if !self.stages.is_empty() {
@@ -90,7 +103,7 @@ impl Report {
         for (i, text) in data.packed_stages.iter().enumerate() {
             let _ = writeln!(page, "<script type=\"text/plain\" id=\"stage-{i}\">{text}</script>");
         }
-        page += &script();
+        let _ = writeln!(page, "<script>{script}</script>");
         page += "</body>\n</html>\n";
         page
     }
@@ -129,6 +142,7 @@ impl Report {
     }
 }
 
+/// What stands between the tags of the page's one script.
 fn script() -> String {
     let mut shaders = Map::new();
     for (name, source) in SHADERS {
@@ -136,9 +150,7 @@ fn script() -> String {
     }
     let shaders = escape_script(&Value::Object(shaders));
     let parts = SCRIPTS.join("\n");
-    format!(
-        "<script>\n\"use strict\";\n(() => {{\nconst SHADERS = {shaders};\n{parts}\n{MAIN}}})();\n</script>\n"
-    )
+    format!("\n\"use strict\";\n(() => {{\nconst SHADERS = {shaders};\n{parts}\n{MAIN}}})();\n")
 }
 
 fn card(class: &str, title: &str, content: &str) -> String {

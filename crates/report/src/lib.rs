@@ -64,6 +64,7 @@ mod picture;
 mod plots;
 mod raster;
 mod report;
+mod sha256;
 mod surface_view;
 mod svg;
 mod text;

@@ -33,12 +33,17 @@ struct Page {
 impl Page {
     /// `None`, with a line that names the test, where there is no browser.
     fn written(test: &str) -> Option<Self> {
+        Self::holding(test, &common::tori().to_html())
+    }
+
+    /// The same of another page.
+    fn holding(test: &str, page: &str) -> Option<Self> {
         let Some(browser) = chromium() else {
             eprintln!("SKIPPED {test}: no chromium on PATH");
             return None;
         };
         let folder = tempfile::tempdir().unwrap();
-        std::fs::write(folder.path().join("page.html"), common::tori().to_html()).unwrap();
+        std::fs::write(folder.path().join("page.html"), page).unwrap();
         Some(Self { folder, browser })
     }
 
@@ -165,4 +170,21 @@ fn the_title_tells_that_it_is_drawn_and_nothing_is_requested() {
     let foreign: Vec<&str> =
         urls.filter(|url| !BROWSER_HOSTS.iter().any(|host| url.contains(host))).collect();
     assert!(foreign.is_empty(), "{foreign:?}");
+}
+
+#[test]
+fn a_script_that_is_not_the_pages_own_does_not_run() {
+    let test = "a_script_that_is_not_the_pages_own_does_not_run";
+    let foreign = "<body>\n<script>document.body.append('it ran')</script>\n\
+                   <img src=\"data:,\" onerror=\"document.body.append('it ran')\">\n\
+                   <style>h1 { color: rgb(1, 2, 3) }</style>\n";
+    let page = common::tori().to_html().replacen("<body>\n", foreign, 1);
+    let Some(page) = Page::holding(test, &page) else { return };
+    let (dom, log) = page.run("field=H", &["--dump-dom".to_owned()]);
+    // The page's own script did.
+    assert!(dom.contains("<title>Two tori – Umbilic</title>"));
+    let after = dom.rsplit("</script>").next().unwrap();
+    assert!(!after.contains("it ran"), "{after}");
+    let refusals = log.lines().filter(|l| l.contains("CONSOLE") && l.contains("Content Security"));
+    assert!(refusals.count() >= 3, "{log}");
 }

@@ -92,5 +92,10 @@ fn the_page_says_this_around_its_plots() {
         text += &format!("<{tag}>…");
         rest = &rest[end..];
     }
-    insta::assert_snapshot!(text + rest);
+    // Hashes of the script and the style change with them.
+    let mut parts = (text + rest).split("'sha256-").map(str::to_owned).collect::<Vec<_>>();
+    for part in parts.iter_mut().skip(1) {
+        *part = format!("'…{}", &part[part.find('\'').unwrap()..]);
+    }
+    insta::assert_snapshot!(parts.concat());
 }

@@ -80,6 +80,12 @@ impl Creases {
         self.sharpness.get(&(a.0.min(b.0), a.0.max(b.0))).copied().unwrap_or(0.0)
     }
 
+    /// Whether no edge is sharp to any degree, and no vertex a corner.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.sharpness.is_empty() && self.corners.is_empty()
+    }
+
     /// Whether `v` was made a corner.
     #[must_use]
     pub fn is_corner(&self, v: VertexId) -> bool {

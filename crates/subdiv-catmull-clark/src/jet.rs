@@ -20,9 +20,6 @@ pub(crate) const fn jet_index(i: usize, j: usize) -> usize {
     order * (order + 1) / 2 + j
 }
 
-const BINOMIAL: [[f64; 4]; 4] =
-    [[1.0, 0.0, 0.0, 0.0], [1.0, 1.0, 0.0, 0.0], [1.0, 2.0, 1.0, 0.0], [1.0, 3.0, 3.0, 1.0]];
-
 /// The jet of a product, by Leibniz' rule.
 ///
 /// # Example
@@ -36,18 +33,20 @@ const BINOMIAL: [[f64; 4]; 4] =
 /// ```
 #[must_use]
 pub fn jet_product(a: &Jet, b: &Jet) -> Jet {
-    let mut out = [0.0; JET_LEN];
-    for (k, &(i, j)) in JET_ORDERS.iter().enumerate() {
-        for p in 0..=i {
-            for q in 0..=j {
-                out[k] += BINOMIAL[i][p]
-                    * BINOMIAL[j][q]
-                    * a[jet_index(p, q)]
-                    * b[jet_index(i - p, j - q)];
-            }
-        }
-    }
-    out
+    let [f, f_u, f_v, f_uu, f_uv, f_vv, f_uuu, f_uuv, f_uvv, f_vvv] = *a;
+    let [g, g_u, g_v, g_uu, g_uv, g_vv, g_uuu, g_uuv, g_uvv, g_vvv] = *b;
+    [
+        f * g,
+        f * g_u + f_u * g,
+        f * g_v + f_v * g,
+        f * g_uu + 2.0 * f_u * g_u + f_uu * g,
+        f * g_uv + f_v * g_u + f_u * g_v + f_uv * g,
+        f * g_vv + 2.0 * f_v * g_v + f_vv * g,
+        f * g_uuu + 3.0 * f_u * g_uu + 3.0 * f_uu * g_u + f_uuu * g,
+        f * g_uuv + f_v * g_uu + 2.0 * f_u * g_uv + 2.0 * f_uv * g_u + f_uu * g_v + f_uuv * g,
+        f * g_uvv + 2.0 * f_v * g_uv + f_vv * g_u + f_u * g_vv + 2.0 * f_uv * g_v + f_uvv * g,
+        f * g_vvv + 3.0 * f_v * g_vv + 3.0 * f_vv * g_v + f_vvv * g,
+    ]
 }
 
 /// The jet of `f(u) g(v)` from the derivatives of the factors.
@@ -193,6 +192,18 @@ mod tests {
             0.0,
         ];
         assert_eq!(jet_product(&a, &b), want);
+    }
+
+    #[test]
+    fn product_of_exponentials_adds_their_exponents() {
+        // e^(a u + b v) at the origin has the derivatives a^i b^j.
+        let exponential = |a: f64, b: f64| separable_jet(&powers(a), &powers(b));
+        let powers_of_two = jet_product(&exponential(0.5, -2.0), &exponential(4.0, 0.25));
+        assert_eq!(powers_of_two, exponential(4.5, -1.75));
+    }
+
+    fn powers(x: f64) -> [f64; 4] {
+        [1.0, x, x * x, x * x * x]
     }
 
     #[test]

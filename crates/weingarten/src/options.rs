@@ -171,7 +171,10 @@ impl Options {
     }
 
     /// Everything that can be checked without the surface.
-    pub(crate) fn check(&self) -> Result<(), Error> {
+    ///
+    /// # Errors
+    /// [`Error`] names the first option at fault.
+    pub fn check(&self) -> Result<(), Error> {
         let weights = [
             ("alignment", self.alignment_weight()),
             ("closeness", self.closeness),

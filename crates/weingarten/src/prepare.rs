@@ -14,6 +14,8 @@ const ROUNDING_RMS: f64 = 1e-8;
 const GRADIENT_TOL: f64 = 1e-9;
 /// Converged if a step is below this share of the unknowns.
 const STEP_TOL: f64 = 1e-10;
+/// Damping of the first step of a level, by far starts and near ones alike (`docs/methods`).
+const INITIAL_DAMPING: f64 = 3e-4;
 
 /// A level ready to be solved.
 pub(crate) struct Prepared {
@@ -50,6 +52,7 @@ fn reduced(level: &Level, options: &Options, origin: &[f64]) -> Result<Prepared,
         options: SolverOptions {
             max_iterations: options.iterations,
             damping_rule: DampingRule::Fivefold,
+            initial_damping: INITIAL_DAMPING,
             gradient_tol: GRADIENT_TOL,
             step_tol: STEP_TOL,
             abs_energy_tol: 0.5 * level.grid.count() as f64 * rounding * rounding,

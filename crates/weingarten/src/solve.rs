@@ -17,6 +17,7 @@ use crate::options::{Formulation, Options};
 use crate::prepare::prepared;
 use crate::sampled::SampledSurface;
 use crate::schedule::Schedule;
+use crate::target::Target;
 use crate::variables::{coordinates, scaled};
 
 /// Over how many last steps it is told what they changed.
@@ -55,6 +56,11 @@ pub struct Solution {
     pub report: RunReport,
     /// Samples in u and v of the last level.
     pub samples: [usize; 2],
+    /// Working lengths per length of the model: the scale [`Metrics::relation_rms`] is measured on.
+    pub working_scale: f64,
+    /// Standard deviations of `H` and `K` at the start, on the working scale, if there is a
+    /// relation: distances from fitted lines and curves are in units of them.
+    pub relation_scale: Option<[f64; 2]>,
     /// Where the result is torn or folded between the samples, checked on a grid ten times as dense;
     /// the status of the report is [`Status::Failed`] then.
     pub flaws: Vec<Flaw>,
@@ -81,7 +87,8 @@ pub struct Solution {
 /// };
 /// let net = (0..64).map(|k| point(k / 8, k % 8)).collect();
 /// let surface = BsplineSurface::new(knots.clone(), knots, net, None)?;
-/// let solution = solve(&surface, &Options::default(), &mut ())?;
+/// let options = Options { iterations: 20, ..Options::default() };
+/// let solution = solve(&surface, &options, &mut ())?;
 /// assert!(solution.metrics.alignment_rms < 0.1 * solution.before.alignment_rms);
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
@@ -266,6 +273,8 @@ fn finish(
         result,
         samples,
         flaws,
+        working_scale: level.stage.unit,
+        relation_scale: target.as_ref().map(Target::deviation),
     })
 }
 

@@ -77,6 +77,12 @@ impl Target {
         Some(Self { kind, unit, size, deviation })
     }
 
+    /// Standard deviations of `H` and `K` at the start on the working scale, which fitted lines and
+    /// curves are measured in.
+    pub(crate) fn deviation(&self) -> [f64; 2] {
+        self.deviation
+    }
+
     /// Where the relation holds, in units of the model; what is fitted is fitted to `samples` (on
     /// the working scale).
     pub(crate) fn locus(&self, samples: &[Sample]) -> RelationLocus {

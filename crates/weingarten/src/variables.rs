@@ -28,7 +28,8 @@ pub const CONTROL_POINTS: &str = "control points";
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 pub fn variables(surface: &BsplineSurface, border: Border) -> Result<Variables, Error> {
-    let (mut variables, _) = bordered(surface, border)?;
+    let (mut variables, points) = bordered(surface, border)?;
+    variables.set_vectors(points);
     let net = Net::of(surface);
     variables.set_order(order(net, surface.degree_u().get(), surface.degree_v().get()));
     Ok(variables)

@@ -23,15 +23,35 @@ pub(crate) fn binomial(n: usize, k: usize) -> f64 {
 
 /// All `B_j^n(t)`, `j = 0..=n`, by the triangular recurrence (no cancellation, ends exact).
 pub(crate) fn bernstein_into(n: usize, t: f64, out: &mut [f64]) {
-    let s = 1.0 - t;
     out[0] = 1.0;
     for d in 1..=n {
-        out[d] = t * out[d - 1];
-        for j in (1..d).rev() {
-            out[j] = s * out[j] + t * out[j - 1];
-        }
-        out[0] *= s;
+        raise(d, t, out);
     }
+}
+
+/// All `B_j^d(t)` from those of degree `d − 1` in their place.
+fn raise(d: usize, t: f64, basis: &mut [f64]) {
+    let s = 1.0 - t;
+    basis[d] = t * basis[d - 1];
+    for j in (1..d).rev() {
+        basis[j] = s * basis[j] + t * basis[j - 1];
+    }
+    basis[0] *= s;
+}
+
+/// Values of polynomials whose degrees rise by one from each to the next, as those of a polynomial
+/// and its derivatives do, the highest derivative first: one recurrence serves all.
+pub(crate) fn eval_rising<const K: usize>(coefficients: [&[DVec3]; K], t: f64) -> [DVec3; K] {
+    let mut basis = [0.0; MAX_DEGREE + 1];
+    let lowest = coefficients[0].len() - 1;
+    bernstein_into(lowest, t, &mut basis);
+    std::array::from_fn(|k| {
+        if k > 0 {
+            raise(lowest + k, t, &mut basis);
+        }
+        debug_assert_eq!(coefficients[k].len(), lowest + k + 1);
+        coefficients[k].iter().zip(&basis).map(|(c, b)| *c * *b).sum()
+    })
 }
 
 /// All `B_j^n(t)` as a fresh vector.

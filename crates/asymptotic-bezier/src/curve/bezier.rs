@@ -2,7 +2,7 @@
 
 use geom_core::DVec3;
 
-use crate::curve::bernstein::{self, derivative, eval};
+use crate::curve::bernstein::{self, derivative};
 
 /// Samples per curve for turning, torsion signs and extremes.
 pub(crate) const CURVE_SAMPLES: usize = 401;
@@ -234,7 +234,8 @@ pub(crate) struct JetTable<'a> {
     first: Vec<DVec3>,
     second: Vec<DVec3>,
     third: Vec<DVec3>,
-    normals: Option<&'a [DVec3]>,
+    /// Normals along the curve and their derivative.
+    normals: Option<(&'a [DVec3], Vec<DVec3>)>,
 }
 
 impl<'a> JetTable<'a> {
@@ -242,25 +243,22 @@ impl<'a> JetTable<'a> {
         let first = bernstein::derivative(&curve.offsets);
         let second = bernstein::derivative(&first);
         let third = bernstein::derivative(&second);
-        let normals = curve.normals();
+        let normals = curve.normals().map(|normals| (normals, derivative(normals)));
         Self { start: curve.points[0], offsets: &curve.offsets, first, second, third, normals }
     }
 
     /// Torsion at `t`, where the curve has this jet: from the normals where there are any
     /// (`|τ| = 1/|N|²`), which inflections and lines do not disturb.
     pub(crate) fn torsion(&self, t: f64, jet: &CurveJet) -> f64 {
-        let Some(normals) = self.normals else { return jet.torsion() };
-        let (n, slope) = (eval(normals, t), eval(&derivative(normals), t));
+        let Some((normals, slopes)) = &self.normals else { return jet.torsion() };
+        let [slope, n] = bernstein::eval_rising([slopes, normals], t);
         n.length_squared().recip().copysign(n.cross(slope).dot(jet.first))
     }
 
     pub(crate) fn at(&self, t: f64) -> CurveJet {
-        CurveJet {
-            position: self.start + bernstein::eval(self.offsets, t),
-            first: bernstein::eval(&self.first, t),
-            second: bernstein::eval(&self.second, t),
-            third: bernstein::eval(&self.third, t),
-        }
+        let rising = [&self.third, &self.second, &self.first, self.offsets];
+        let [third, second, first, offset] = bernstein::eval_rising(rising, t);
+        CurveJet { position: self.start + offset, first, second, third }
     }
 
     /// Bisects towards the sharpest turn of the binormal between two parameters; a turn by more

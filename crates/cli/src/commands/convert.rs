@@ -8,6 +8,7 @@ use crate::outcome::{Outcome, Status};
 use crate::report_support;
 use curvature_variation::limit_patches;
 use exchange::{LengthUnit, Mesh, Model, NamedSurface};
+use serde::Serialize;
 use std::path::{Path, PathBuf};
 use subdiv_catmull_clark::Creases;
 
@@ -52,8 +53,10 @@ impl Convert {
         if let Some(unit) = self.unit.clone() {
             model = model.in_unit(unit).map_err(|e| Failure::input(&self.input, e))?;
         }
-        let mut outcome = Outcome::new(Status::Converged, 0).with_input(&self.input);
         let told = self.take_limit_surfaces(&mut model)?;
+        let mut outcome = Outcome::new(Status::Converged, 0)
+            .with_input(&self.input)
+            .with_metrics(&ConvertMetrics::new(&model))?;
         outcome.warnings.clone_from(&model.warnings);
         outcome.add_model(self.output.clone(), &model)?;
         outcome.summary = summary(&self.output, &model, outcome.files[0].1.len());
@@ -124,4 +127,27 @@ fn summary(path: &Path, model: &Model, bytes: usize) -> Vec<String> {
         format!("{}: {}", path.display(), counts.collect::<Vec<_>>().join(", ")),
         format!("  lengths in {}, {size}", model.unit),
     ]
+}
+/// The `metrics` object: what is written, and the mean of its control points if it has surfaces,
+/// else of its vertices.
+#[derive(Serialize)]
+struct ConvertMetrics {
+    surfaces: usize,
+    control_points: usize,
+    vertices: usize,
+    faces: usize,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    centroid: Option<[f64; 3]>,
+}
+
+impl ConvertMetrics {
+    fn new(model: &Model) -> Self {
+        Self {
+            surfaces: model.surfaces.len(),
+            control_points: model.surfaces.iter().map(|s| s.surface.control_points().len()).sum(),
+            vertices: model.meshes.iter().map(|m| m.positions.len()).sum(),
+            faces: model.meshes.iter().map(|m| m.faces.len()).sum(),
+            centroid: model.centroid().map(|c| c.to_array()),
+        }
+    }
 }

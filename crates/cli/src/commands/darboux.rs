@@ -6,7 +6,7 @@ use crate::failure::Failure;
 use crate::input_file::PartArgs;
 use crate::net_files::{self, NetInput};
 use crate::net_report;
-use crate::option_flags::{OptionFlags, in_flags};
+use crate::option_flags::{self, OptionFlags, in_flags};
 use crate::outcome::{Outcome, Status};
 use crate::report_support;
 use crate::watch::Watch;
@@ -64,7 +64,7 @@ impl Darboux {
             NetInput::Net(surface) => (*surface, Status::Converged, 0),
             NetInput::Mesh(mesh) => self.solve(&mesh, &mut watch, &mut warnings)?,
         };
-        let image = darboux::solve(&surface, &options, &mut watch).map_err(|e| refused(&e))?;
+        let image = darboux::solve(&surface, &options, &mut watch).map_err(|e| self.refused(&e))?;
         let status = match image.report.status {
             Status::Interrupted => Status::Interrupted,
             _ => status,
@@ -118,6 +118,23 @@ impl Darboux {
             hyperbolic_nets::solve(&Input::new(&net), &options, watch).map_err(refused)?;
         warnings.extend(solution.warnings.iter().map(ToString::to_string));
         Ok((solution.result, solution.report.status, solution.report.iterations))
+    }
+
+    /// What the library says, of the file it speaks of.
+    fn refused(&self, error: &darboux::Error) -> Failure {
+        let file = match error {
+            darboux::Error::BadCage(_) => self.cage.as_ref(),
+            darboux::Error::OutsideRealDomain { .. }
+            | darboux::Error::Infinite { .. }
+            | darboux::Error::Collapsed
+            | darboux::Error::NoVertex
+            | darboux::Error::Patch(_) => Some(&self.input),
+            _ => None,
+        };
+        match file {
+            Some(file) => option_flags::refused::<Options>(file, error),
+            None => refused(error),
+        }
     }
 
     /// The transformation that the flags ask for; those of the file come first.

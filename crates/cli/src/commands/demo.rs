@@ -1,6 +1,7 @@
 //! `umbilic demo [DIR]`.
 
 use crate::args::ReportArgs;
+use crate::choice::Choice;
 use crate::commands::weingarten::outcome;
 use crate::context::Context;
 use crate::failure::Failure;
@@ -19,7 +20,7 @@ use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 /// The built-in input.
-const ROOF: &str = include_str!("../../../../fixtures/roof.ron");
+pub(super) const ROOF: &str = include_str!("../../../../fixtures/roof.ron");
 /// Control nets the roof is optimised at, one after the other.
 const LEVELS: [(usize, usize); 4] = [(10, 8), (14, 10), (18, 14), (25, 18)];
 /// Panels in u and v.
@@ -67,7 +68,7 @@ impl Demo {
         let mut watch = Watch::new(context, "optimising");
         let solution =
             weingarten::solve(&named.surface, &options, &mut watch).map_err(Failure::other)?;
-        let mut outcome = outcome(&solution, &model.unit)?;
+        let mut outcome = outcome(&solution, &options, &model.unit)?;
         if !watch.finish(&mut outcome) {
             return Ok(outcome);
         }
@@ -92,7 +93,7 @@ impl Demo {
         let pages = ReportArgs { report: Some(page.clone()), figures: None };
         report_support::add_files(&mut outcome, &pages, context, report)?;
         let seconds = begin.elapsed().as_secs_f64();
-        let file = outcome.metrics_file("demo", seconds, context.threads);
+        let file = outcome.metrics_file("demo", seconds, context.threads, &Choice::default());
         outcome.files.push((metrics.clone(), file));
         let written: Vec<String> = paths.iter().map(|p| p.display().to_string()).collect();
         outcome.summary.push(format!("written: {}", written.join(", ")));

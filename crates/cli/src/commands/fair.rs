@@ -70,6 +70,7 @@ impl Fair {
         self.output.check()?;
         self.report.check()?;
         let options = self.options.options(&self.config)?;
+        options.check().map_err(|e| self.options.refused(&self.config, e))?;
         let files = &self.files;
         let held = files.fix.is_some() || files.creases.is_some() || options.clamp_boundary;
         if held && !files.family.is_empty() {
@@ -86,7 +87,7 @@ impl Fair {
         context.afford(cost, "levels")?;
         let mut result = solve(&input, &options, &mut watch).map_err(|e| match e {
             Error::Solver(e @ SolverError::ForeignCheckpoint { .. }) => watch.foreign(&e),
-            e => refused::<Options>(&self.input, e),
+            e => self.refused(&e),
         })?;
         result.metrics.peak_memory_mb = peak_memory_mb();
         let mut outcome = Outcome::new(result.report.status, result.report.iterations)
@@ -128,14 +129,29 @@ impl Fair {
 }
 
 impl Fair {
+    /// What the library says, of the file it speaks of.
+    fn refused(&self, error: &Error) -> Failure {
+        let constraints = self.files.fix.as_ref();
+        let file = match error {
+            Error::NoSuchVertex { .. } | Error::Weight { .. } | Error::NothingFree { .. } => {
+                constraints
+            }
+            // Counted from 1.
+            Error::OtherFaces { member } => self.files.family.get(member - 1),
+            _ => None,
+        };
+        refused::<Options>(file.unwrap_or(&self.input), error)
+    }
+
     /// The mesh and what the files say of it; a note on them joins the model's warnings.
     fn read(&self, model: &mut Model) -> Result<Input, Failure> {
         let mesh = read_control_mesh(&self.input, model)?;
         let creases = match &self.files.creases {
             None => Creases::none(),
             Some(path) => {
+                // An edge of sharpness `inf` stays sharp for ever.
                 let list: CreaseList =
-                    exchange::read_ron(path).map_err(|e| Failure::input(path, e))?;
+                    exchange::read_ron_with_infinity(path).map_err(|e| Failure::input(path, e))?;
                 model.warnings.extend(list.note().map(|n| format!("{}: {n}", path.display())));
                 list.for_mesh(&mesh).map_err(|e| Failure::input(path, e))?
             }

@@ -59,7 +59,7 @@ impl Fit {
         self.output.check()?;
         self.report.check()?;
         let options = self.options.options(&self.config)?;
-        let settings = settings(&options)?;
+        let settings = settings(&options).map_err(|e| self.options.refused(&self.config, e))?;
         let model = input_file::read(context, &self.input, &SurfaceArgs::default(), &self.part)?;
         let data = points(&self.input, &model)?;
         let fit = fit_grid(&data.points, data.n_u, data.n_v, data.closed_u, &settings)
@@ -108,15 +108,13 @@ impl Fit {
     }
 }
 
-fn settings(options: &Options) -> Result<GridFitOptions, Failure> {
+fn settings(options: &Options) -> Result<GridFitOptions, String> {
     let degree = options.degree.map(Degree::new).transpose();
     if let Some(tolerance) = options.tolerance.filter(|t| !(t.is_finite() && *t > 0.0)) {
-        return Err(Failure::usage(format!(
-            "--tolerance {tolerance}: a tolerance is a positive length; give one"
-        )));
+        return Err(format!("`tolerance` is {tolerance}; give a positive length"));
     }
     Ok(GridFitOptions {
-        degree: degree.map_err(|e| Failure::usage(format!("--degree: {e}")))?,
+        degree: degree.map_err(|e| format!("`degree`: {e}"))?,
         control_points: options.ctrl.map(|counts| (counts.u, counts.v)),
         tolerance: options.tolerance,
     })

@@ -50,8 +50,8 @@ impl Hnet {
         self.report.check()?;
         net_files::check_outputs(&self.output.output, &net_files::NET_OUTPUTS)?;
         let options = self.options.options(&self.config)?;
+        options.check().map_err(|e| self.options.refused(&self.config, e))?;
         let refused = |e: Error| option_flags::refused::<Options>(&self.input, e);
-        options.check().map_err(refused)?;
         let mut watch = Watch::new(context, "net")
             .of(&self.input)
             .with_checkpoints(&self.checkpoint)?

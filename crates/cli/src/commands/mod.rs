@@ -15,6 +15,7 @@ mod fair;
 mod fit;
 mod hnet;
 mod panel;
+mod verify;
 mod weingarten;
 
 use crate::context::Context;
@@ -66,6 +67,8 @@ commands! {
     panel::Panel,
     /// Optimise a B-spline surface towards a Weingarten surface
     weingarten::Weingarten,
+    /// Recompute what a run claims from the files it wrote
+    verify::Verify,
     /// Turn quads along asymptotic directions into a smooth skin of ruled patches
     hnet::Hnet,
 }

@@ -80,6 +80,7 @@ impl Panel {
         self.check_outputs()?;
         self.report.check()?;
         let options = self.options.options(&self.config)?;
+        options.check().map_err(|e| self.options.refused(&self.config, e))?;
         let mut watch =
             Watch::new(context, "panelling").of(&self.input).with_checkpoints(&self.checkpoint)?;
         let (model, named) = read_surface(context, &self.input, &self.surface)?;

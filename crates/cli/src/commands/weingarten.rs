@@ -12,10 +12,10 @@ use crate::report_support::weingarten::weingarten_report;
 use crate::watch::Watch;
 use bspline::{Flaw, FlawKind};
 use exchange::{LengthUnit, Model, NamedSurface};
-use gp_solver::SolverError;
+use gp_solver::{OptionValue, SolverError};
 use serde::Serialize;
 use std::path::PathBuf;
-use weingarten::{Error, Input, Metrics, Options, Solution, solve};
+use weingarten::{Error, Input, Metrics, Options, RelationLocus, Solution, solve};
 
 /// Arguments of `weingarten`.
 #[derive(Debug, clap::Args)]
@@ -54,6 +54,7 @@ impl Weingarten {
         self.output.check()?;
         self.report.check()?;
         let options = self.options.options(&self.config)?;
+        options.check().map_err(|e| self.options.refused(&self.config, e))?;
         let mut watch = Watch::new(context, "optimising")
             .of(&self.input)
             .with_checkpoints(&self.checkpoint)?
@@ -72,7 +73,7 @@ impl Weingarten {
             }
             e => refused::<Options>(&self.input, e),
         })?;
-        let mut outcome = outcome(&solution, &model.unit)?.with_input(&self.input);
+        let mut outcome = outcome(&solution, &options, &model.unit)?.with_input(&self.input);
         outcome.warnings.extend(model.warnings);
         self.ending.apply(&mut outcome);
         if !watch.finish(&mut outcome) {
@@ -100,13 +101,23 @@ impl Weingarten {
 }
 
 /// Status, metrics and summary.
-pub(crate) fn outcome(solution: &Solution, unit: &LengthUnit) -> Result<Outcome, Failure> {
+pub(crate) fn outcome(
+    solution: &Solution,
+    options: &Options,
+    unit: &LengthUnit,
+) -> Result<Outcome, Failure> {
     let report = &solution.report;
     let mut outcome = Outcome::new(report.status, report.iterations).with_metrics(&Numbers {
         metrics: &solution.metrics,
         variables: report.variables(),
         control_points: solution.result.control_points().len(),
         samples: solution.samples[0] * solution.samples[1],
+        samples_u: solution.samples[0],
+        samples_v: solution.samples[1],
+        relation: options.relation.print().unwrap_or_default(),
+        working_scale: solution.working_scale,
+        relation_scale: solution.relation_scale,
+        relation_line: solution.relation.as_ref().and_then(line),
         flaws: solution.flaws.len(),
         flaws_at: solution.flaws.iter().map(|f| (f.kind.as_str(), f.u, f.v)).collect(),
         ms_per_iteration: report.ms_per_iteration(),
@@ -125,12 +136,39 @@ struct Numbers<'a> {
     variables: usize,
     control_points: usize,
     samples: usize,
+    samples_u: usize,
+    samples_v: usize,
+    /// The relation asked for, as in options.
+    relation: String,
+    /// Lengths `relation_rms` is measured in per length of the model.
+    working_scale: f64,
+    /// Standard deviations of H and K at the start on that scale, which distances from fitted lines
+    /// and curves are measured in.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    relation_scale: Option<[f64; 2]>,
+    /// `a H + b K + c = 0` in units of the model, where the relation is a line.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    relation_line: Option<Line>,
     /// Check points where the result folds, has a spike or is not finite, and where.
     flaws: usize,
     #[serde(skip_serializing_if = "Vec::is_empty")]
     flaws_at: Vec<(&'static str, f64, f64)>,
     ms_per_iteration: f64,
     factorizations: usize,
+}
+
+#[derive(Serialize)]
+struct Line {
+    a: f64,
+    b: f64,
+    c: f64,
+}
+
+fn line(locus: &RelationLocus) -> Option<Line> {
+    match *locus {
+        RelationLocus::Line { a, b, c } => Some(Line { a, b, c }),
+        _ => None,
+    }
 }
 
 /// How the run ended, in words. Steps that were asked for and made are no cause for alarm.

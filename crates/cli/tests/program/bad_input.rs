@@ -67,15 +67,15 @@ fn faulty_surfaces() {
         // NaN, infinity, a weight that is not positive.
         (
             scene("2", [first, "(1, 0, 0), (1, 1, NaN), (1, 2, 0)", third], ""),
-            "surface 1: control point 4 is [1, 1, NaN]; coordinates must be finite",
+            "line 1: column 117: `NaN` is not a finite number; write finite numbers",
         ),
         (
             scene("2", [first, "(1, 0, 0), (1, 1, 1e999), (1, 2, 0)", third], ""),
-            "surface 1: control point 4 is [1, 1, inf]; coordinates must be finite",
+            "line 1: column 117: `1e999` is not a finite number; write finite numbers",
         ),
         (
             scene("2, knots: [0, 0, 0, NaN, 1, 1]", ROWS, ""),
-            "surface 1: knot 2 is 0 and the next NaN; knots must be finite and sorted",
+            "line 1: column 46: `NaN` is not a finite number; write finite numbers",
         ),
         (
             scene("2", ROWS, ", weights: [[1, 1, 1], [1, -1, 1], [1, 1, 1]]"),

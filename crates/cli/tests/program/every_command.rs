@@ -122,7 +122,7 @@ fn bad_input_is_one_sentence_with_the_file() {
     let hole = write("hole.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n");
     let at = |path: &str, rest: &str| format!("umbilic: {path}: {rest}");
     refused(&["convert", "no/such.obj", "OUT"], &at("no/such.obj", "cannot be read (No such file"));
-    refused(&["convert", "fixtures", "OUT"], &at("fixtures", "no reader for the extension ``"));
+    refused(&["convert", "fixtures", "OUT"], &at("fixtures", "is not a regular file; name a file"));
     refused(&["convert", &truncated, "OUT"], &at(&truncated, "line "));
     refused(&["analyze", &no_surface], &at(&no_surface, "the file has no surface; export"));
     refused(&["analyze", &knots], &at(&knots, "surface 1: knot 1 is 1 and the next 0"));

@@ -140,9 +140,14 @@ fn ctrl_c_at_any_moment_ends_every_command_within_a_second() {
             "surface.ron --panels 30x30 -o out.glb --report page.html",
             "fixtures/roof-optimised.ron --panels 16x16 --max-kink-deg 1 -o out.csv",
         ],
+        "verify" => vec!["fitted.json"],
         "weingarten" => vec!["surface.ron --iterations 1 -o out.step"],
         _ => vec![],
     };
+    let fit =
+        ["fit", "grid.obj", "--ctrl", "60x60", "-o", "fitted.step", "--metrics", "fitted.json"];
+    let fitted = Command::new(UMBILIC).args(fit).current_dir(folder.path()).output();
+    assert!(fitted.expect("it runs").status.success());
     let before: Vec<String> = names(folder.path());
     let mut random = Random::new(1);
     for command in cli::command().get_subcommands().map(|c| c.get_name().to_owned()) {

@@ -3,6 +3,7 @@
 
 mod asymptotic;
 mod bad_input;
+mod careful_files;
 mod common;
 mod dist;
 #[path = "../../examples/dist.rs"]
@@ -21,6 +22,7 @@ mod report;
 #[cfg(unix)]
 mod resume;
 mod snapshots;
+mod verify;
 mod weingarten;
 
 #[cfg(not(unix))]

@@ -83,7 +83,7 @@ impl<'b> Numbers<'b> {
     }
 
     /// Refuses accessors whose numbers are not all within the file.
-    fn check(self, accessor: &Accessor<'_>) -> Result<(), ReadError> {
+    pub(super) fn check(self, accessor: &Accessor<'_>) -> Result<(), ReadError> {
         let index = accessor.index();
         let fail = |what: String| Err(ReadError::content(format!("accessor {index} {what}"), MEND));
         let (count, size) = (accessor.count(), accessor.size());

@@ -16,7 +16,7 @@ use gltf::json::validation::{Error as Fault, Validate};
 use gltf::mesh::Mode;
 use gltf::{Document, Semantic};
 use serde::Deserialize;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 /// The largest JSON part that is read: the description of a scene, not its coordinates.
 const MOST_JSON: usize = 4 << 20;
@@ -92,13 +92,14 @@ pub fn read_glb(bytes: &[u8]) -> Result<Model, ReadError> {
     for root in roots {
         scene.walk(root, upright, &mut visited, 0)?;
     }
-    scene.check_size(budget.model_bytes())?;
+    let numbers = Numbers { binary };
+    scene.check_size(numbers, budget.model_bytes())?;
     let mut meshes = Vec::new();
     for (node, place) in &scene.placed {
         let Some(node) = document.nodes().nth(*node) else { continue };
         if let Some(mesh) = node.mesh() {
             let name = node.name().unwrap_or_default();
-            meshes.extend(placed_mesh(&mesh, name, *place, Numbers { binary })?);
+            meshes.extend(placed_mesh(&mesh, name, *place, numbers)?);
         }
     }
     if meshes.is_empty() {
@@ -206,13 +207,23 @@ impl Scene<'_> {
     }
 
     /// Refuses scenes that place their meshes too often, before anything is built.
-    fn check_size(&self, budget: usize) -> Result<(), ReadError> {
+    fn check_size(&self, numbers: Numbers<'_>, budget: usize) -> Result<(), ReadError> {
         let mut sizes: BTreeMap<usize, usize> = BTreeMap::new();
         for mesh in self.document.meshes() {
             let mut bytes = 0_usize;
+            let mut counted = BTreeSet::new();
             for primitive in mesh.primitives() {
-                let vertices = primitive.get(&Semantic::Positions).map_or(0, |a| a.count());
-                let corners = primitive.indices().map_or(vertices, |a| a.count());
+                let positions = primitive.get(&Semantic::Positions);
+                // A count beyond the data is no size.
+                positions.iter().try_for_each(|a| numbers.check(a))?;
+                primitive.indices().iter().try_for_each(|a| numbers.check(a))?;
+                let corners = match primitive.indices() {
+                    Some(indices) => indices.count(),
+                    None => positions.as_ref().map_or(0, gltf::Accessor::count),
+                };
+                // Primitives that share their vertices share them in the mesh.
+                let is_new = |a: &gltf::Accessor<'_>| counted.insert(a.index());
+                let vertices = positions.filter(is_new).map_or(0, |a| a.count());
                 // A strip has three corners per index.
                 let per_corner = match primitive.mode() {
                     Mode::TriangleStrip | Mode::TriangleFan => 3 * PER_CORNER,

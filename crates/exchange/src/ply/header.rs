@@ -102,7 +102,10 @@ pub(super) fn read_header(bytes: &[u8]) -> Result<Header, ReadError> {
             Err(ReadError::text(number, format!("{what} `{}`", clip(&line)), mend))
         };
         match words[..] {
-            ["format", format, _] => {
+            ["format", format, version] => {
+                if version != "1.0" {
+                    return fault("unknown version in", "write `format NAME 1.0`");
+                }
                 has_format = true;
                 header.encoding = match format {
                     "ascii" => Encoding::Ascii,

@@ -36,6 +36,7 @@ pub fn read_ply(bytes: &[u8]) -> Result<Model, ReadError> {
             }
         }
     }
+    model.warnings.extend(body.rest());
     if mesh.positions.is_empty() {
         return Err(ReadError::content("the file has no vertex", "export it with vertices"));
     }
@@ -53,6 +54,25 @@ struct Body<'a> {
 }
 
 impl Body<'_> {
+    /// What to say if something follows the last element.
+    fn rest(&self) -> Option<String> {
+        let rest = &self.bytes[self.at.min(self.bytes.len())..];
+        match self.encoding {
+            Encoding::Ascii => {
+                let after = rest.iter().position(|b| !b.is_ascii_whitespace())?;
+                let lines = rest[..after].iter().filter(|b| **b == b'\n').count();
+                let line = self.line + lines;
+                Some(format!("line {line}: what follows the last element is left out"))
+            }
+            _ if rest.is_empty() => None,
+            _ => Some(format!(
+                "byte {}: the {} bytes after the last element are left out",
+                self.at,
+                rest.len()
+            )),
+        }
+    }
+
     fn error(&self, what: impl Into<String>, mend: &str) -> ReadError {
         match self.encoding {
             Encoding::Ascii => ReadError::text(self.line, what, mend),

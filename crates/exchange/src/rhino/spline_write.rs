@@ -83,16 +83,22 @@ mod tests {
     use super::*;
 
     #[test]
-    fn weighted_coordinates_come_back_to_the_last_bit_or_within_one() {
+    fn weighted_coordinates_come_back_wherever_a_double_does_that_else_within_one_bit() {
         let (mut x, mut exact) = (0.1_f64, 0);
         for k in 0..1000 {
             x = (x * 997.13).fract() + 0.01;
             let w = 0.05 + f64::from(k) * 0.0031;
             let back = weighted(x, w) / w;
             assert!(back == x || back == x.next_up() || back == x.next_down());
+            // Nothing in reach of the product does better.
+            let reach = 8;
+            let lowest = (0..reach).fold(x * w, |y, _| y.next_down());
+            let mut all = std::iter::successors(Some(lowest), |y| Some(y.next_up()));
+            assert_eq!(all.by_ref().take(2 * reach + 1).any(|y| y / w == x), back == x, "{x} {w}");
             exact += usize::from(back == x);
             assert_eq!(weighted(x, 0.25) / 0.25, x);
         }
-        assert!(exact > 900, "{exact}");
+        // A quotient misses a double only where doubles are wider spaced above than below it.
+        assert!(exact > 500, "{exact}");
     }
 }

@@ -277,9 +277,9 @@ impl<'a> System<'a> {
         &self.gradient
     }
 
-    /// Diagonal of the normal matrix at the last linearisation, by position, its mean over the
-    /// components of a [vector](crate::Variables::set_vectors); where it is zero the unknown's
-    /// natural size stands in.
+    /// Diagonal of the normal matrix at the last linearisation, by position, for the components of a
+    /// [vector](crate::Variables::set_vectors) its mean or its mean over all systems of axes; where
+    /// it is zero the unknown's natural size stands in.
     #[must_use]
     pub fn diagonal(&self) -> &[f64] {
         &self.diagonal
@@ -297,10 +297,9 @@ impl<'a> System<'a> {
         self.keeps_scaling = keep;
     }
 
-    /// Damps a vector by its block of the matrix from the next linearisation on: steps then are as
-    /// free in a direction that the terms leave open, whichever it is, as a coordinate of its own
-    /// would be. Only for scalings that follow the iterate, for the largest of several blocks is no
-    /// block.
+    /// Damps a vector of `k` components by `(2 B + tr B I)/(k + 2)` from the next linearisation on,
+    /// `B` its block of the matrix: what its coordinates would give in the mean over all systems of
+    /// axes. Only for scalings that follow the iterate, for the largest of several blocks is no block.
     pub(crate) fn damp_by_blocks(&mut self, blocks: bool) {
         self.has_blocks = blocks && !self.vectors.is_empty();
     }
@@ -461,7 +460,7 @@ impl<'a> System<'a> {
             self.diagonal[i] = if a != 0.0 { a.abs() } else { 1.0 / (size * size) };
         }
         if self.has_blocks {
-            self.vectors.take(&self.matrix);
+            self.vectors.take(&self.matrix, &mut self.diagonal);
         } else {
             self.vectors.average(&mut self.diagonal);
         }
@@ -548,11 +547,11 @@ impl<'a> System<'a> {
         let begin = Instant::now();
         self.factorizations += 1;
         if self.has_blocks {
-            self.vectors.put(&mut self.matrix, 1.0 + damping);
+            self.vectors.put(&mut self.matrix, damping);
         }
         let result = self.factor.factor(&self.matrix, &self.shift);
         if self.has_blocks {
-            self.vectors.put(&mut self.matrix, 1.0);
+            self.vectors.put(&mut self.matrix, 0.0);
         }
         self.timings.factor += begin.elapsed();
         if let Err(error) = result {

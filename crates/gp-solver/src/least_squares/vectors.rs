@@ -5,6 +5,11 @@ use crate::linear::Factor;
 use crate::problem::Problem;
 
 /// The positions of the free components of every vector, and their couplings.
+///
+/// Of a vector's block `B` of the normal matrix, over `k` components, this makes the block
+/// `D = (2 B + tr B · I)/(k + 2)`: the mean of `diag B` over all systems of axes, so that it depends
+/// on none. (For a unit vector `q`, the mean of `q qᵀ B q qᵀ` over the sphere is
+/// `(2 B + tr B · I)/(k (k + 2))`, and `diag B` in the axes `q` is the sum of `k` of these.)
 #[derive(Default)]
 pub(super) struct VectorPlan {
     starts: Vec<usize>,
@@ -13,6 +18,13 @@ pub(super) struct VectorPlan {
     pairs: Vec<[u32; 3]>,
     /// The products at the last linearisation.
     products: Vec<f64>,
+    /// What of a product is in `D`.
+    shares: Vec<f64>,
+}
+
+/// Share of a block of so many components in `D`.
+fn share_of(components: usize) -> f64 {
+    2.0 / (components as f64 + 2.0)
 }
 
 impl VectorPlan {
@@ -39,6 +51,7 @@ impl VectorPlan {
                         }
                     }
                 }
+                this.shares.resize(this.pairs.len(), share_of(free.len()));
             }
         }
         this.products = vec![0.0; this.pairs.len()];
@@ -49,51 +62,63 @@ impl VectorPlan {
         self.positions.is_empty()
     }
 
-    /// Takes up the products of a matrix.
-    pub(super) fn take(&mut self, matrix: &[f64]) {
+    /// Takes up the products of a matrix, and makes of its diagonal that of `D`.
+    pub(super) fn take(&mut self, matrix: &[f64], diagonal: &mut [f64]) {
         for (product, &[.., slot]) in self.products.iter_mut().zip(&self.pairs) {
             *product = matrix[slot as usize];
         }
+        self.merge(diagonal, |value, sum, count| {
+            let share = share_of(count);
+            share * value + (1.0 - share) * (sum / count as f64)
+        });
     }
 
-    /// Puts the products into the matrix, times a factor.
-    pub(super) fn put(&self, matrix: &mut [f64], factor: f64) {
-        for (product, &[.., slot]) in self.products.iter().zip(&self.pairs) {
-            matrix[slot as usize] = product * factor;
+    /// Puts the matrix with `damping` times `D` into the places of the products.
+    pub(super) fn put(&self, matrix: &mut [f64], damping: f64) {
+        let entries = self.products.iter().zip(&self.shares).zip(&self.pairs);
+        for ((product, share), &[.., slot]) in entries {
+            matrix[slot as usize] = product + damping * (share * product);
         }
     }
 
-    /// The off-diagonal part of `vᵀ D v`, with `D` the blocks of the vectors.
+    /// The off-diagonal entries of `D`.
+    fn couplings(&self) -> impl Iterator<Item = (usize, usize, f64)> {
+        let entries =
+            self.products.iter().zip(&self.shares).map(|(product, share)| share * product);
+        entries.zip(&self.pairs).map(|(entry, &[a, b, _])| (a as usize, b as usize, entry))
+    }
+
+    /// The off-diagonal part of `vᵀ D v`.
     pub(super) fn cross(&self, v: &[f64]) -> f64 {
-        let term =
-            |(product, &[a, b, _]): (&f64, &[u32; 3])| product * v[a as usize] * v[b as usize];
-        2.0 * self.products.iter().zip(&self.pairs).map(term).sum::<f64>()
+        2.0 * self.couplings().map(|(a, b, entry)| entry * v[a] * v[b]).sum::<f64>()
     }
 
     /// Adds the off-diagonal part of `D v`.
     pub(super) fn add_cross(&self, v: &[f64], out: &mut [f64]) {
-        for (product, &[a, b, _]) in self.products.iter().zip(&self.pairs) {
-            out[a as usize] += product * v[b as usize];
-            out[b as usize] += product * v[a as usize];
+        for (a, b, entry) in self.couplings() {
+            out[a] += entry * v[b];
+            out[b] += entry * v[a];
         }
     }
 
     /// Replaces the values of the components of every vector by their sum.
     pub(super) fn sum(&self, values: &mut [f64]) {
-        self.merge(values, |sum, _| sum);
+        self.merge(values, |_, sum, _| sum);
     }
 
     /// Replaces the values of the components of every vector by their mean.
     pub(super) fn average(&self, values: &mut [f64]) {
-        self.merge(values, |sum, count| sum / count as f64);
+        self.merge(values, |_, sum, count| sum / count as f64);
     }
 
-    fn merge(&self, values: &mut [f64], of: impl Fn(f64, usize) -> f64) {
+    /// Replaces every value by what `of` makes of it, the sum over its vector and their number.
+    fn merge(&self, values: &mut [f64], of: impl Fn(f64, f64, usize) -> f64) {
         for ends in self.starts.windows(2) {
             let components = &self.positions[ends[0]..ends[1]];
             let sum: f64 = components.iter().map(|&at| values[at as usize]).sum();
-            let value = of(sum, components.len());
-            components.iter().for_each(|&at| values[at as usize] = value);
+            for &at in components {
+                values[at as usize] = of(values[at as usize], sum, components.len());
+            }
         }
     }
 }
@@ -132,6 +157,33 @@ mod tests {
             seen.push([cos * x[0] + sin * x[1], -sin * x[0] + cos * x[1], x[2]]);
         }
         seen
+    }
+
+    #[test]
+    fn blocks_are_the_mean_of_the_diagonal_over_all_axes() {
+        // Springs of stiffness 1, 3 and 9 along the coordinates: (2 B + 13 I) / 5.
+        let mut variables = Variables::new();
+        let points = variables.add("points", 1, 3);
+        variables.set_vectors(points);
+        let mut problem = Problem::new(variables);
+        let mut rows = QuadraticBuilder::new("springs");
+        let stiffness = [1.0_f64, 3.0, 9.0];
+        for (c, k) in stiffness.into_iter().enumerate() {
+            rows.equation(1.0).linear(c, k.sqrt());
+        }
+        problem.add(rows.build());
+        let options = Options { damping_rule: DampingRule::Fivefold, ..Options::default() };
+        let mut run = Run::new(
+            System::new(problem, crate::Factorization::Auto).unwrap(),
+            &[1.0; 3],
+            &Options { initial_damping: 1.0, ..options },
+        )
+        .unwrap();
+        assert_eq!(run.step(&mut ()).unwrap(), Step::Taken);
+        for (x, k) in run.x().iter().zip(stiffness) {
+            let damped = (2.0 * k + 13.0) / 5.0;
+            assert!((x - damped / (k + damped)).abs() < 1e-14, "{x}");
+        }
     }
 
     #[test]

@@ -41,6 +41,10 @@ pub struct Metrics {
     pub sampling_error_max: f64,
     /// Samples.
     pub samples: usize,
+    /// Largest distance of a sample from the circle its parameter line is: rulings go to circles.
+    pub circle_defect_max: f64,
+    /// Mean of the samples.
+    pub centroid: [f64; 3],
 }
 
 /// What a user should know although there is a result.
@@ -137,9 +141,43 @@ pub fn solve(
         cage_error_max: fit.as_ref().map(|f| f.errors.iter().copied().fold(0.0, f64::max)),
         sampling_error_max: error,
         samples: result.samples.len(),
+        circle_defect_max: circle_defect(&result),
+        centroid: centroid(&result).to_array(),
     };
     let status =
         if status == Status::Interrupted { Status::Interrupted } else { Status::Converged };
     let report = RunReport { status, iterations: 0, stages: Vec::new() };
     Ok(Solution { result, metrics, report, warnings, map, fit, corners })
+}
+
+fn centroid(sampled: &SampledPatches) -> DVec3 {
+    let sum: DVec3 = sampled.samples.iter().map(|s| s.point).sum();
+    sum / sampled.samples.len().max(1) as f64
+}
+
+/// Largest distance of the samples along a parameter line from the circle through the first, the
+/// middle and the last of them, to first order.
+///
+/// Inverted at the first point, the circle is the line through the images of the other two, on which
+/// those of all points must lie; a straight line is no exception.
+fn circle_defect(sampled: &SampledPatches) -> f64 {
+    let (n, point) = (sampled.cells, |k: usize| sampled.samples[k].point);
+    let side = n + 1;
+    let along = |start: usize, step: usize| {
+        let a = point(start);
+        let inverted = |k: usize| {
+            let chord = point(start + k * step) - a;
+            chord / chord.length_squared()
+        };
+        let (foot, middle) = (inverted(n), inverted(n / 2));
+        let direction = (middle - foot).normalize_or_zero();
+        let distance = |k: usize| {
+            let chord = point(start + k * step) - a;
+            (inverted(k) - foot).cross(direction).length() * chord.length_squared()
+        };
+        (1..n).map(distance).fold(0.0, f64::max)
+    };
+    let patches = sampled.samples.len() / (side * side);
+    let lines = (0..patches).flat_map(|p| (0..side).map(move |k| (p * side * side, k)));
+    lines.map(|(from, k)| along(from + k, side).max(along(from + k * side, 1))).fold(0.0, f64::max)
 }

@@ -36,13 +36,15 @@ impl PriceList {
         Self::new(MoldType::ALL.map(|kind| (kind, price)))
     }
 
-    /// Checks that every one of `types` has a usable price.
+    /// Checks that every one of `types` has a price, and that all prices of the list make sense.
     ///
     /// # Errors
     /// [`Error::NoPrice`] or [`Error::BadPrice`] names the type.
     pub fn check(&self, types: &[MoldType]) -> Result<(), Error> {
-        for kind in types {
-            let price = self.prices.get(kind).ok_or(Error::NoPrice { kind: kind.name() })?;
+        if let Some(kind) = types.iter().find(|kind| !self.prices.contains_key(kind)) {
+            return Err(Error::NoPrice { kind: kind.name() });
+        }
+        for (kind, price) in &self.prices {
             for value in [price.mold, price.panel] {
                 if !(value >= 0.0 && value.is_finite()) {
                     return Err(Error::BadPrice { kind: kind.name(), value });
@@ -72,6 +74,11 @@ mod tests {
         list.prices.remove(&MoldType::Torus);
         assert!(matches!(
             list.check(&[MoldType::Plane]),
+            Err(Error::BadPrice { kind: "plane", .. })
+        ));
+        // A price that makes no sense, of a type that is not asked for.
+        assert!(matches!(
+            list.check(&[MoldType::Cubic]),
             Err(Error::BadPrice { kind: "plane", .. })
         ));
         let error = list.check(&[MoldType::Cubic, MoldType::Torus]).unwrap_err();

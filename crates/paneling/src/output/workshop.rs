@@ -19,6 +19,9 @@ pub struct PanelRow {
     pub mold_type: MoldType,
     /// Place of the panel's middle in the domain of the surface.
     pub parameters: [f64; 2],
+    /// Corners of the panel in the domain of the surface, counterclockwise.
+    #[serde(default)]
+    pub corners: Vec<[f64; 2]>,
     /// Origin of the mold's frame.
     pub origin: [f64; 3],
     /// First axis of the mold's frame.
@@ -59,6 +62,7 @@ impl Paneling {
                     mold,
                     mold_type: self.molds[mold].kind,
                     parameters: set.middles()[p],
+                    corners: set.corners(p).to_vec(),
                     origin: pose.origin.to_array(),
                     x_axis: pose.rotation.x_axis.to_array(),
                     z_axis: pose.rotation.z_axis.to_array(),

@@ -39,6 +39,8 @@ pub struct Spread {
     pub p95: f64,
     /// The largest value.
     pub max: f64,
+    /// Root mean square: no value can change without it.
+    pub rms: f64,
 }
 
 impl Spread {
@@ -56,7 +58,9 @@ impl Spread {
                 _ => 0.0,
             }
         };
-        Self { median: at(0.5), p95: at(0.95), max: at(1.0) }
+        let squares: f64 = values.iter().map(|x| x * x).sum();
+        let rms = (squares / values.len().max(1) as f64).sqrt();
+        Self { median: at(0.5), p95: at(0.95), max: at(1.0), rms }
     }
 }
 
@@ -71,6 +75,8 @@ pub struct Measures {
     pub gaps: Spread,
     /// The largest distance of each panel from the design, along the design's normal.
     pub deviations: Vec<f64>,
+    /// Root mean square of that distance over all samples of all panels.
+    pub deviation_rms: f64,
 }
 
 impl Measures {
@@ -142,7 +148,7 @@ pub(crate) fn measure(
             measure
         })
         .collect();
-    let deviations = (0..set.len())
+    let offsets: Vec<[f64; 3]> = (0..set.len())
         .into_par_iter()
         .with_min_len(64)
         .map(|p| {
@@ -152,12 +158,18 @@ pub(crate) fn measure(
                 let local = to_local * (*x - poses[p].origin);
                 foot(&molds[labels[p]], local, to_local * *n).0.abs()
             };
-            points.iter().zip(normals).map(offset).fold(0.0, f64::max)
+            let all = points.iter().zip(normals).map(offset);
+            all.fold([0.0, 0.0, 0.0], |[most, squares, count]: [f64; 3], t| {
+                [most.max(t), squares + t * t, count + 1.0]
+            })
         })
         .collect();
     let kinks = Spread::of(seams.iter().flat_map(|s| s.kinks).collect());
     let gaps = Spread::of(seams.iter().flat_map(|s| s.gaps).collect());
-    Measures { seams, kinks, gaps, deviations }
+    let deviations = offsets.iter().map(|[most, ..]| *most).collect();
+    let sum = |k: usize| offsets.iter().map(|o| o[k]).sum::<f64>();
+    let deviation_rms = (sum(1) / sum(2).max(1.0)).sqrt();
+    Measures { seams, kinks, gaps, deviations, deviation_rms }
 }
 
 /// Largest angle to the design and largest offset from it along the border of a panel.

@@ -3,7 +3,7 @@
 mod lamellas;
 mod page;
 
-use crate::args::{ConfigArgs, EndingArgs, OutputArgs, ReportArgs, check_output_path};
+use crate::args::{ConfigArgs, EndingArgs, OutputArgs, ReportArgs, check_output_folder};
 use crate::checkpoints::CheckpointArgs;
 use crate::context::Context;
 use crate::failure::Failure;
@@ -33,7 +33,7 @@ pub(crate) struct Asymptotic {
     #[command(flatten)]
     options: OptionFlags<Options>,
     /// Write the unrolled strips (lamellas.svg, lamellas.dxf) and tables (lamellas.csv, nodes.csv)
-    /// into this existing folder
+    /// into this folder, which is made if need be
     #[arg(long, value_name = "DIR")]
     lamellas: Option<PathBuf>,
     #[command(flatten)]
@@ -55,10 +55,10 @@ impl Asymptotic {
         self.report.check()?;
         let options = self.options.options(&self.config)?;
         if let Some(folder) = &self.lamellas {
-            check_output_path(&folder.join("lamellas.svg"))?;
+            check_output_folder(folder)?;
         }
         let said = |e: &dyn std::fmt::Display| in_flags::<Options>(&e.to_string());
-        options.check().map_err(|e| Failure::usage(said(&e)))?;
+        options.check().map_err(|e| self.options.refused(&self.config, e))?;
         let mut watch =
             Watch::new(context, "solving").of(&self.data).with_checkpoints(&self.checkpoint)?;
         let (input, unit, warnings) = read_input(context, &self.data, &self.part, &options)?;

@@ -3,7 +3,11 @@
 const element = (name, attributes = {}, ...children) => {
   const svg = ["svg", "path", "line", "rect", "text", "circle", "g", "clipPath", "defs"].includes(name);
   const node = svg ? document.createElementNS("http://www.w3.org/2000/svg", name) : document.createElement(name);
-  for (const [key, value] of Object.entries(attributes)) node.setAttribute(key, value);
+  for (const [key, value] of Object.entries(attributes)) {
+    // The page's policy refuses the attribute, and takes what its own script sets.
+    if (key === "style") node.style.cssText = value;
+    else node.setAttribute(key, value);
+  }
   node.append(...children);
   return node;
 };
