@@ -9,7 +9,7 @@ use geom_core::{CurvatureStatistics, DVec3, SurfaceJet};
 impl BsplineSurface {
     /// Area and curvatures of the surface: area and means by Gauss quadrature with 5 x 5 nodes in
     /// every cell of the knot spans, the extremes over the nodes and over the corners of the cells.
-    /// Poles have the curvature of their surroundings, see [`SurfaceCurvature`]; points without
+    /// Poles have the curvature of their surroundings, see [`SurfaceCurvature`](crate::SurfaceCurvature); points without
     /// curvature are counted and left out, with the area they stand for.
     ///
     /// # Example
