@@ -3,7 +3,7 @@
 //! a port of MINPACK. The argument describes the machine.
 #![expect(clippy::print_stdout, reason = "the page is the output")]
 
-#[path = "../tests/problems/mod.rs"]
+#[path = "../tests/all/problems/mod.rs"]
 mod problems;
 
 use gp_solver::{Options, Problem, Report, SolverError, solve};

@@ -279,3 +279,74 @@ fn step_files_have_a_face_for_every_patch() {
     assert!(fitted > 0 && fitted <= faces, "{fitted} of {faces}");
     assert!(m["metrics"]["fitted_deviation_max"].as_f64().expect("a distance") < 1e-3);
 }
+
+#[test]
+fn converged_results_have_nothing_left_to_gain() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = |name: &str| folder.path().join(name).display().to_string();
+    let (first, again, json) = (path("first.obj"), path("again.obj"), path("m.json"));
+    let run = |input: &str, out: &str, method: &str| {
+        let result = umbilic(&[
+            "fair",
+            input,
+            "-o",
+            out,
+            "--levels",
+            "0",
+            "--method",
+            method,
+            "--metrics",
+            &json,
+        ]);
+        assert!(result.status.success(), "{}", common::message(&result));
+        let text = fs::read_to_string(&json).expect("a metrics file");
+        let m: serde_json::Value = serde_json::from_str(&text).expect("JSON");
+        let energy = m["metrics"]["energy_final"].as_f64().expect("an energy");
+        (m["status"] == "converged", energy)
+    };
+    let methods = ["lagged-gauss-newton", "gauss-newton", "sobolev", "lbfgs"];
+    let mut converged = 0;
+    for mesh in ["cube", "torus-thin", "ellipsoid", "vase"] {
+        for method in methods {
+            let (is_converged, before) = run(&format!("fixtures/quads/{mesh}.obj"), &first, method);
+            if is_converged {
+                converged += 1;
+                for restart in methods {
+                    let (_, after) = run(&first, &again, restart);
+                    let gain = (before - after) / before;
+                    assert!(gain <= 0.01, "{mesh}, {method}, then {restart}: {gain}");
+                }
+            }
+        }
+    }
+    assert!(converged >= 8, "{converged} runs converged");
+}
+
+#[test]
+fn tags_of_an_obj_file_are_creases() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let cube = fs::read_to_string(common::root().join("fixtures/quads/cube.obj")).expect("a cube");
+    let face: Vec<u32> = cube
+        .lines()
+        .find_map(|line| line.strip_prefix("f "))
+        .expect("a face")
+        .split_whitespace()
+        .map(|word| word.split('/').next().and_then(|v| v.parse::<u32>().ok()).expect("a number"))
+        .map(|v| v - 1)
+        .collect();
+    let (a, b) = (face[0], face[1]);
+    let tagged =
+        written(folder.path(), "tagged.obj", &format!("{cube}t crease 2/1/0 {a} {b} 10\n"));
+    let list = written(folder.path(), "list.ron", &format!("(edges: [(({a}, {b}), inf)])"));
+    let run = |input: &str, more: &[&str], name: &str| {
+        let out = folder.path().join(name).display().to_string();
+        let start = ["fair", input, "-o", &out, "--levels", "1", "--iterations", "2"];
+        let result = umbilic(&[&start, more].concat());
+        assert!(result.status.success(), "{}", common::message(&result));
+        fs::read(out).expect("written")
+    };
+    let smooth = run("fixtures/quads/cube.obj", &[], "a.obj");
+    let by_list = run("fixtures/quads/cube.obj", &["--creases", &list], "b.obj");
+    let by_tag = run(&tagged, &[], "c.obj");
+    assert!(by_tag == by_list && by_tag != smooth);
+}

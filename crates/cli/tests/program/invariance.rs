@@ -1,11 +1,11 @@
 //! The same answer wherever the model stands: moved, scaled, turned, mirrored, with u and v
-//! exchanged.
+//! exchanged, with vertices and faces in another order.
 
 #![allow(clippy::unwrap_used, reason = "a test may stop at the first surprise")]
 
 use crate::common::{message, root, umbilic};
 use bspline::BsplineSurface;
-use exchange::Model;
+use exchange::{Mesh, Model};
 use geom_core::{Ball, DMat3, DVec3};
 use serde_json::{Map, Value};
 use std::path::Path;
@@ -57,6 +57,12 @@ const CASES: &[Case] = &[
         is_surface: false,
     },
     Case {
+        input: "fixtures/nets/catenoid-ring.obj",
+        command: &["darboux", "--c", "-0.6"],
+        extension: "obj",
+        is_surface: false,
+    },
+    Case {
         input: "fixtures/quads/cube.obj",
         command: &["fair"],
         extension: "obj",
@@ -91,10 +97,16 @@ struct Motion {
     scale: f64,
     by: DVec3,
     exchanged: bool,
+    renumbered: bool,
 }
 
-const STILL: Motion =
-    Motion { turn: DMat3::IDENTITY, scale: 1.0, by: DVec3::ZERO, exchanged: false };
+const STILL: Motion = Motion {
+    turn: DMat3::IDENTITY,
+    scale: 1.0,
+    by: DVec3::ZERO,
+    exchanged: false,
+    renumbered: false,
+};
 
 impl Motion {
     fn point(&self, p: DVec3) -> DVec3 {
@@ -118,9 +130,42 @@ impl Motion {
         }
         for mesh in &mut model.meshes {
             mesh.positions.iter_mut().for_each(|p| *p = self.point(*p));
+            if self.renumbered {
+                *mesh = renumbered(mesh);
+            }
         }
         model
     }
+}
+
+/// The mesh with vertices and faces in another order, every second quad with the opposite first corner.
+fn renumbered(mesh: &Mesh) -> Mesh {
+    let place = shuffled(mesh.positions.len());
+    let mut positions = mesh.positions.clone();
+    for (&p, &to) in mesh.positions.iter().zip(&place) {
+        positions[to] = p;
+    }
+    let faces: Vec<&[u32]> = mesh.faces.iter().collect();
+    let order = shuffled(faces.len());
+    let face = |k: &usize| {
+        let mut face: Vec<u32> = faces[*k].iter().map(|v| place[*v as usize] as u32).collect();
+        // The first corner says between which diagonal and family a net tells.
+        let half = face.len() / 2;
+        face.rotate_left(k % 2 * half);
+        face
+    };
+    Mesh::new(positions, order.iter().map(face))
+}
+
+/// The numbers below `count` in an order that looks like none, the same every time.
+fn shuffled(count: usize) -> Vec<usize> {
+    let mut order: Vec<usize> = (0..count).collect();
+    let mut state = 12345_u64;
+    for k in (1..count).rev() {
+        state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1);
+        order.swap(k, (state >> 33) as usize % (k + 1));
+    }
+    order
 }
 
 /// The surface with u and v exchanged.
@@ -177,7 +222,8 @@ fn run(
         true => args.extend(exchanged.iter().map(String::as_str)),
         false => args.extend(&case.command[1..]),
     }
-    let out = at(if case.command[0] == "hnet" { "out.obj" } else { "out.step" });
+    let is_net = ["hnet", "darboux"].contains(&case.command[0]);
+    let out = at(if is_net { "out.obj" } else { "out.step" });
     if case.command[0] != "analyze" {
         args.extend(["-o", &out]);
     }
@@ -199,6 +245,7 @@ fn power(key: &str) -> Option<i32> {
     Some(match key {
         _ if key.ends_with("_percent") || key.ends_with("_deg") || key.ends_with("_edges") => 0,
         "area" => 2,
+        "sampling_error_max" | "circle_defect_max" => 1,
         "tolerance" | "torus_fit_rms" | "fitted_deviation_max" => 1,
         _ if key.starts_with("gap_") || key.starts_with("distance_") => 1,
         _ if key.starts_with("gaussian_curvature") => -2,
@@ -227,10 +274,6 @@ const ROUNDING: &[(&str, f64)] = &[
     ("mean_jump_max", 1e-5),
 ];
 
-/// Percentiles are told to 1/256 of their size, by the leading digits of the samples; those of a
-/// model in another unit are others.
-const PERCENTILE: f64 = 1.0 / 128.0;
-
 fn number(metrics: &Map<String, Value>, key: &str) -> Option<f64> {
     metrics.get(key).and_then(Value::as_f64)
 }
@@ -256,6 +299,18 @@ fn exchanged_key(key: &str) -> String {
     }
 }
 
+/// How well what is left over of differences of large numbers is the same: the gradient in a valley,
+/// and what quadrature misses, which another order of the faces moves as far as rounding moves the
+/// last steps.
+fn remainder(key: &str, motion: &Motion) -> f64 {
+    match key {
+        "gradient_norm" if motion.renumbered => 0.9,
+        "gradient_norm" => 1e-3,
+        "gauss_bonnet_residual" | "quadrature_gap" if motion.renumbered => 0.02,
+        _ => 0.0,
+    }
+}
+
 fn compare(
     what: &str,
     motion: &Motion,
@@ -276,13 +331,9 @@ fn compare(
             }
             continue;
         }
-        // What is left of the gradient in a valley is a difference of large numbers.
-        let tolerance = if key == "gradient_norm" && tolerance > 0.0 { 1e-3 } else { tolerance };
+        let tolerance = if tolerance > 0.0 { remainder(key, motion).max(tolerance) } else { 0.0 };
         // Angles below a millionth of a degree are rounding.
         let least = if key.ends_with("_deg") { 1e-6 } else { 1e-9 };
-        let is_percentile = key.ends_with("_p01") || key.ends_with("_p99");
-        let is_coarse = is_percentile && tolerance > 0.0;
-        let tolerance = if is_coarse { PERCENTILE } else { tolerance };
         if !((a - b).abs() <= tolerance * a.abs().max(b.abs()).max(least)) {
             let off = (a - b).abs() / a.abs().max(b.abs());
             faults.push(format!("{what}: {key} {a:e} became {b:e} ({off:.1e})"));
@@ -324,6 +375,10 @@ fn check(case: &Case) -> Vec<String> {
     ];
     motions.push(("turned", turned([0.7, 0.0, 0.0]), 1e-6));
     motions.push(("turned freely", turned([0.4, -1.1, 2.3]), 1e-6));
+    // A fit runs along the sides of its grid, and which comes first is a matter of numbers.
+    if case.extension == "obj" && case.command[0] != "fit" {
+        motions.push(("renumbered", Motion { renumbered: true, ..STILL }, 1e-6));
+    }
     if case.is_surface {
         motions.push(("u and v exchanged", Motion { exchanged: true, ..STILL }, 1e-6));
     }
@@ -332,7 +387,8 @@ fn check(case: &Case) -> Vec<String> {
         let what = format!("{} {} {name}", case.command[0], case.input);
         let (status_after, steps_after, after) =
             run(case, &motion.apply(&model), &motion, folder.path());
-        if status_after != status || steps_after.abs_diff(steps) > 1.max(steps / 50) {
+        let few = if motion.renumbered { steps / 20 } else { steps / 50 };
+        if status_after != status || steps_after.abs_diff(steps) > few.max(1) {
             faults.push(format!(
                 "{what}: {status} in {steps} became {status_after} in {steps_after}"
             ));
@@ -360,7 +416,7 @@ fn panels_are_the_same_wherever_the_model_stands() {
 
 #[test]
 fn nets_and_patches_are_the_same_wherever_the_model_stands() {
-    the_same_answer_for(&["hnet", "asymptotic"]);
+    the_same_answer_for(&["hnet", "darboux", "asymptotic"]);
 }
 
 #[test]

@@ -1,10 +1,25 @@
 //! Runs that are interrupted at ten moments and go on from their checkpoints: the same bytes.
 
-use crate::common::{UMBILIC, message, program, root, stopped, stops_within_a_second, umbilic};
+use crate::common::{
+    Stopped, UMBILIC, message, program, root, stopped, stops_within_a_second, umbilic,
+};
 use std::fs;
 use std::path::Path;
 use std::process::{Command, Stdio};
-use std::time::Instant;
+use std::time::{Duration, Instant};
+
+/// A run that is stopped after some time, or sooner where it has ended by then: on a busy machine no
+/// two runs take the same.
+fn stopped_before_its_end(args: &[&str], out: &Path, mut after: Duration) -> Stopped {
+    loop {
+        let part = stopped(&mut program(args), after);
+        if part.is_interrupted() || after < Duration::from_millis(2) {
+            return part;
+        }
+        fs::remove_file(out).expect("written");
+        after /= 2;
+    }
+}
 
 /// Interrupts a command at ten moments of its course and resumes it; then with options it was not
 /// begun with.
@@ -24,7 +39,7 @@ fn resumes_to_the_same_bytes(args: &[&str], extension: &str, other: &[&str]) {
         let after = time.mul_f64((f64::from(moment) + 0.5) / 10.0);
         let what = format!("{args:?} after {after:?} of {time:?}");
         let keeping = [args, &["-o", &out, "--checkpoint", &state]].concat();
-        let part = stopped(&mut program(&keeping), after);
+        let part = stopped_before_its_end(&keeping, Path::new(&out), after);
         if part.is_interrupted() {
             interrupted += 1;
             assert!(!Path::new(&out).exists(), "{what}");
@@ -48,8 +63,8 @@ fn resumes_to_the_same_bytes(args: &[&str], extension: &str, other: &[&str]) {
             stops_within_a_second(&what, &|| stopped(&mut program(&keeping), after));
         }
     }
-    // A busy machine delays signals; the libraries' own tests stop each method at all ten moments.
-    assert!(interrupted >= 1, "{args:?}: no signal came in time");
+    // The libraries' own tests stop each method at all ten moments.
+    assert!(interrupted >= 5, "{args:?}: {interrupted} of ten signals came in time");
     let names = fs::read_dir(folder.path()).expect("a folder").flatten();
     let temporary = names.filter(|e| e.file_name().to_string_lossy().starts_with('.')).count();
     assert_eq!(temporary, 0, "{args:?} left temporary files");
