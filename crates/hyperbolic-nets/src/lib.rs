@@ -40,8 +40,8 @@ pub use methods::POLISH;
 pub use metrics::Metrics;
 pub use net::{
     AsymptoticField, BilinearPatch, BoundaryPolygon, Combination, EdgeJoin, Family, HyperbolicNet,
-    InnerEdge, KINK_SAMPLES, KinkStatistics, LelieuvreStart, NetEdge, PatchJet, QuadNet, Quadric,
-    SampledPatches, ShapeFit, Spread, SurfaceSample, WireCut, best_log_factor, distances,
+    InnerEdge, KINK_SAMPLES, KinkStatistics, LelieuvreStart, NetEdge, PatchJet, PlacedNet, QuadNet,
+    Quadric, SampledPatches, ShapeFit, Spread, SurfaceSample, WireCut, best_log_factor, distances,
     distinct_shape_parameters, fit_shape_parameters, second_differences, shape_parameters,
     star_planarity, third_differences, wire_cuts,
 };

@@ -10,7 +10,7 @@ use crate::methods::joint::Joint;
 use crate::methods::published::Published;
 use crate::methods::{Solved, Watch};
 use crate::metrics::Metrics;
-use crate::net::{AsymptoticField, HyperbolicNet};
+use crate::net::{AsymptoticField, HyperbolicNet, PlacedNet};
 use crate::options::{Boundary, Method, Options};
 use crate::warning::Warning;
 
@@ -32,6 +32,8 @@ use crate::warning::Warning;
 pub struct Solution {
     /// The net with its shape parameters, and its Lelieuvre normals from the joint method.
     pub result: HyperbolicNet,
+    /// The same in the coordinates it was solved in, where nothing has been rounded.
+    pub placed: PlacedNet,
     /// Its measures.
     pub metrics: Metrics,
     /// What the solver did. A net that folds is [`Status::Partial`] or [`Status::Failed`], by
@@ -146,8 +148,9 @@ pub fn solve_with(
     if report.status == Status::Stalled {
         warnings.push(Warning::NotExact);
     }
-    let result = restored(&result, input, &place)?;
-    Ok(Solution { result, metrics, report, gates, warnings, violation })
+    let placed = PlacedNet::solved(result, place);
+    let result = restored(placed.net(), input, &place)?;
+    Ok(Solution { result, placed, metrics, report, gates, warnings, violation })
 }
 
 /// A net in normalised coordinates back where the model stands; Lelieuvre normals are roots of

@@ -12,10 +12,11 @@ use crate::report_support;
 use crate::watch::Watch;
 use exchange::Model;
 use geom_core::DVec3;
+use gp_solver::RunReport;
 use hyperbolic_nets::darboux::{
-    self, Branch, CAGE_EDGES, Corner, DarbouxMap, Freedom, Metrics, Options, TransformedNet,
+    self, Branch, CAGE_EDGES, Corner, Freedom, Metrics, Options, Solution,
 };
-use hyperbolic_nets::{HyperbolicNet, Input, QuadNet};
+use hyperbolic_nets::{HyperbolicNet, Input, PlacedNet, QuadNet};
 use report::{LineRole, LineSet};
 use serde::Deserialize;
 use std::path::{Path, PathBuf};
@@ -23,7 +24,7 @@ use std::path::{Path, PathBuf};
 /// Arguments of `darboux`.
 #[derive(Debug, clap::Args)]
 #[command(
-    after_help = "Example: umbilic darboux fixtures/nets/enneper.obj --c -0.6 -o image.glb --metrics image.json\n\nWith --c, coordinates are counted from the middle of the net's bounding box in lengths of its diagonal. With --corner or --cage, the corners of that box, enlarged by 5 % of the diagonal, move: corner i is at the high end in x, y, z where bit 0, 1, 2 of i is set."
+    after_help = "Example: umbilic darboux fixtures/nets/enneper.obj --c -0.6 -o image.glb --metrics image.json\n\nWith --c, coordinates are counted from the middle of the smallest ball around the net in lengths of its diameter. With --corner or --cage, the corners of the net's bounding box, enlarged by 5 % of its diagonal, move: corner i is at the high end in x, y, z where bit 0, 1, 2 of i is set."
 )]
 pub(crate) struct Darboux {
     /// Net file, or quads along asymptotic directions (solved first)
@@ -60,17 +61,27 @@ impl Darboux {
         let options = self.options()?;
         let mut watch = Watch::new(context, "net").of(&self.input);
         let (input, unit, mut warnings) = net_files::read(context, &self.input, &self.part)?;
-        let (surface, status, steps) = match input {
-            NetInput::Net(surface) => (*surface, Status::Converged, 0),
-            NetInput::Mesh(mesh) => self.solve(&mesh, &mut watch, &mut warnings)?,
+        let (surface, placed, status, steps) = match input {
+            NetInput::Net(surface) => {
+                let placed =
+                    PlacedNet::new(&surface).map_err(|e| Failure::input(&self.input, e))?;
+                (*surface, placed, Status::Converged, 0)
+            }
+            NetInput::Mesh(mesh) => {
+                let solution = self.solve(&mesh, &mut watch)?;
+                warnings.extend(solution.warnings.iter().map(ToString::to_string));
+                let RunReport { status, iterations, .. } = solution.report;
+                (solution.result, solution.placed, status, iterations)
+            }
         };
-        let image = darboux::solve(&surface, &options, &mut watch).map_err(|e| self.refused(&e))?;
+        let image =
+            darboux::solve_placed(placed, &options, &mut watch).map_err(|e| self.refused(&e))?;
         let status = match image.report.status {
             Status::Interrupted => Status::Interrupted,
             _ => status,
         };
         warnings.extend(image.warnings.iter().map(ToString::to_string));
-        let (metrics, sampled, corners) = (&image.metrics, &image.result, &image.corners);
+        let (metrics, sampled) = (&image.metrics, &image.result);
         let mut outcome =
             Outcome::new(status, steps).with_input(&self.input).with_metrics(metrics)?;
         self.ending.apply(&mut outcome);
@@ -91,8 +102,7 @@ impl Darboux {
             let other = if chosen == Branch::Regular { Branch::Other } else { Branch::Regular };
             // The last stage is shown first.
             for branch in [other, chosen] {
-                match add_image(&mut page, &surface, &image.map, branch, corners, &unit.to_string())
-                {
+                match add_image(&mut page, &surface, &image, branch, &unit.to_string()) {
                     Ok(()) => {}
                     Err(error) if branch == other => {
                         page.warnings.push(format!("the other image is not shown: {error}"));
@@ -109,15 +119,11 @@ impl Darboux {
         &self,
         mesh: &geom_core::PolyMesh,
         watch: &mut Watch<'_>,
-        warnings: &mut Vec<String>,
-    ) -> Result<(HyperbolicNet, Status, usize), Failure> {
+    ) -> Result<hyperbolic_nets::Solution, Failure> {
         let refused = |e: hyperbolic_nets::Error| Failure::input(&self.input, e);
         let net = QuadNet::new(mesh).map_err(refused)?;
         let options = hyperbolic_nets::Options::default();
-        let solution =
-            hyperbolic_nets::solve(&Input::new(&net), &options, watch).map_err(refused)?;
-        warnings.extend(solution.warnings.iter().map(ToString::to_string));
-        Ok((solution.result, solution.report.status, solution.report.iterations))
+        hyperbolic_nets::solve(&Input::new(&net), &options, watch).map_err(refused)
     }
 
     /// What the library says, of the file it speaks of.
@@ -181,18 +187,17 @@ fn read_cage(path: &Path) -> Result<(Vec<Corner>, Freedom), Failure> {
 fn add_image(
     page: &mut report::Report,
     surface: &HyperbolicNet,
-    map: &DarbouxMap,
+    solution: &Solution,
     branch: Branch,
-    corners: &[DVec3; 8],
     unit: &str,
 ) -> Result<(), String> {
     let text = |e: darboux::Error| e.to_string();
-    let image = TransformedNet::new(surface, map, branch).map_err(text)?;
-    let sampled = image.sample(net_files::PICTURE_CELLS).map_err(text)?;
+    let Solution { placed, map, corners, .. } = solution;
+    let sampled = placed.sample_image(map, branch, net_files::PICTURE_CELLS).map_err(text)?;
     let name = if branch == Branch::Regular { "regular image" } else { "other image" };
     let view = net_report::view(name, &sampled, unit).map_err(|e| e.to_string())?;
     // An edge of the cage outside the real domain, or through infinity, is left out.
-    let arc = |ends: [DVec3; 2]| darboux::image_of_segment(map, branch, ends, 24).ok();
+    let arc = |ends: [DVec3; 2]| placed.image_of_segment(map, branch, ends, 24).ok();
     let edges = CAGE_EDGES.iter().filter_map(|e| arc(e.map(|k| corners[k])));
     let mut cage = LineSet::new("cage", "transformed cage", LineRole::ControlNet, edges.collect());
     cage.visible = true;
@@ -201,7 +206,7 @@ fn add_image(
     let faces = LineSet::new("cage-faces", title, LineRole::ControlNet, faces.collect());
     let arcs = surface.net().edges().iter().map(|e| {
         let ends = e.ends.map(|v| surface.net().positions()[v]);
-        darboux::image_of_segment(map, branch, ends, 6)
+        placed.image_of_segment(map, branch, ends, 6)
     });
     let arcs = arcs.collect::<Result<Vec<_>, _>>().map_err(text)?;
     let mut panels = LineSet::new("panels", "panel edges (circular arcs)", LineRole::Curves, arcs);

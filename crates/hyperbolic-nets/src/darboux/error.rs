@@ -41,6 +41,9 @@ pub enum Error {
     /// A net without vertices.
     #[error("the net has no vertex")]
     NoVertex,
+    /// A net without a size one could work with.
+    #[error(transparent)]
+    Place(#[from] geom_core::NormalizationError),
     /// A patch at fault.
     #[error(transparent)]
     Patch(#[from] crate::PatchError),

@@ -8,6 +8,7 @@ mod cage;
 mod error;
 mod map;
 mod options;
+mod placed;
 mod solve;
 mod transformed;
 
@@ -15,5 +16,5 @@ pub use cage::{CageFit, Freedom, cage_corners, fit_cage};
 pub use error::{CageFault, Error};
 pub use map::{Branch, Cyclide, DarbouxMap, ImageCircle};
 pub use options::{Corner, Options};
-pub use solve::{Metrics, Solution, Warning, solve};
+pub use solve::{Metrics, Solution, Warning, solve, solve_placed};
 pub use transformed::{CAGE_EDGES, TransformedNet, cage_face_lines, image_of_segment};

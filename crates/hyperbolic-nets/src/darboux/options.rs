@@ -65,8 +65,9 @@ serde_as_text!(Corner);
 options! {
     /// Settings of [`crate::darboux::solve`].
     ///
-    /// With `c`, coordinates are counted from the middle of the net's bounding box in lengths of its
-    /// diagonal. With corners, those of that box, enlarged by 5 % of the diagonal, move.
+    /// With `c`, coordinates are counted from the middle of the smallest ball around the net in lengths
+    /// of its diameter, so that a turned net has the turned image. With corners, those of the net's
+    /// bounding box, enlarged by 5 % of its diagonal, move.
     ///
     /// # Example
     /// ```

@@ -1,6 +1,6 @@
 //! The image of a whole net, sampled and measured.
 
-use geom_core::{BoundingBox, DVec3};
+use geom_core::{Ball, BoundingBox, DVec3};
 use gp_solver::{Observer, RunReport, Status};
 use serde::Serialize;
 
@@ -9,7 +9,7 @@ use super::error::Error;
 use super::map::DarbouxMap;
 use super::options::Options;
 use super::transformed::TransformedNet;
-use crate::net::{HyperbolicNet, SampledPatches};
+use crate::net::{HyperbolicNet, PlacedNet, SampledPatches};
 
 /// Accuracy of the sampled image as a share of its bounding-box diagonal.
 const ACCURACY: f64 = 1e-4;
@@ -70,10 +70,13 @@ pub struct Solution {
     pub report: RunReport,
     /// What the user should know.
     pub warnings: Vec<Warning>,
-    /// The transformation.
+    /// The transformation, of normalised coordinates.
     pub map: DarbouxMap,
-    /// The cage it was fitted to, if it was.
-    pub fit: Option<CageFit>,
+    /// The net in normalised coordinates, which gives further images in model units.
+    pub placed: PlacedNet,
+    /// Of a transformation by a cage: distance of the image of every corner from where it was asked
+    /// to go, in model units.
+    pub corner_errors: Option<[f64; 8]>,
     /// The corners of the cage before.
     pub corners: [DVec3; 8],
 }
@@ -101,36 +104,42 @@ pub fn solve(
     options: &Options,
     observer: &mut dyn Observer,
 ) -> Result<Solution, Error> {
-    options.check()?;
-    let bounds =
-        BoundingBox::of(surface.net().positions().iter().copied()).ok_or(Error::NoVertex)?;
-    let corners = cage_corners(bounds, CAGE_MARGIN);
-    let (map, c, fit) = match options.c {
-        Some(c) => {
-            let map = DarbouxMap::new(c)?.in_frame(bounds.center(), bounds.diagonal())?;
-            (map, Some(c), None)
-        }
-        None => {
-            let mut images = corners;
-            for corner in options.corners.iter() {
-                images[corner.index] = corner.point;
-            }
-            let fit = fit_cage(&corners, &images, options.freedom)?;
-            (fit.map.clone(), fit.c, Some(fit))
-        }
-    };
-    let image = TransformedNet::new(surface, &map, options.branch)?;
-    let extent = BoundingBox::of(image.positions()?).map_or(1.0, BoundingBox::diagonal);
-    let (result, error, status) = image.sample_within(ACCURACY * extent, observer)?;
-    let mut warnings = Vec::new();
-    if status == Status::IterationLimit {
-        warnings.push(Warning::Coarse { error });
+    if surface.net().positions().is_empty() {
+        return Err(Error::NoVertex);
     }
-    let kinks = image.kinks()?;
+    solve_placed(PlacedNet::new(surface)?, options, observer)
+}
+
+/// As [`solve`], of a net that is in normalised coordinates already, such as that of
+/// [`crate::Solution`]: nothing of it is lost, wherever its model stands.
+///
+/// # Errors
+/// As [`solve`].
+pub fn solve_placed(
+    placed: PlacedNet,
+    options: &Options,
+    observer: &mut dyn Observer,
+) -> Result<Solution, Error> {
+    options.check()?;
+    let corners = cage_corners(bounds_of(placed.net())?, CAGE_MARGIN);
+    let Transformation { map, c, fit } =
+        transformation(&placed, &corners, options).map_err(|e| placed.told(e))?;
+    let (sampled, sampling_error, sampling) =
+        sampled(&placed, &map, options, observer).map_err(|e| placed.told(e))?;
+    let kinks = TransformedNet::new(placed.net(), &map, options.branch)?.kinks()?;
+    let unit = placed.place().scale().recip();
+    let circle_defect_max = circle_defect(&sampled) * unit;
+    let sampling_error_max = sampling_error * unit;
+    let result = placed.restored(sampled);
+    let mut warnings = Vec::new();
+    if sampling == Status::IterationLimit {
+        warnings.push(Warning::Coarse { error: sampling_error_max });
+    }
+    let corner_errors = fit.map(|fit| fit.errors.map(|e| e * unit));
     let (gaussian_curvature_min, gaussian_curvature_max) = result.range(|s| s.gaussian_curvature);
     let (mean_curvature_min, mean_curvature_max) = result.range(|s| s.mean_curvature);
     let metrics = Metrics {
-        faces: surface.shape().len(),
+        faces: placed.net().shape().len(),
         c,
         kink_max_deg: kinks.iter().copied().fold(0.0, f64::max).to_degrees(),
         kink_mean_deg: (kinks.iter().sum::<f64>() / kinks.len().max(1) as f64).to_degrees(),
@@ -138,20 +147,65 @@ pub fn solve(
         gaussian_curvature_max,
         mean_curvature_min,
         mean_curvature_max,
-        cage_error_max: fit.as_ref().map(|f| f.errors.iter().copied().fold(0.0, f64::max)),
-        sampling_error_max: error,
+        cage_error_max: corner_errors.map(|errors| errors.into_iter().fold(0.0, f64::max)),
+        sampling_error_max,
         samples: result.samples.len(),
-        circle_defect_max: circle_defect(&result),
-        centroid: centroid(&result).to_array(),
+        circle_defect_max,
+        centroid: placed.place().restore(centroid(&placed, &result)).to_array(),
     };
-    let status =
-        if status == Status::Interrupted { Status::Interrupted } else { Status::Converged };
+    let status = match sampling {
+        Status::Interrupted => Status::Interrupted,
+        _ => Status::Converged,
+    };
     let report = RunReport { status, iterations: 0, stages: Vec::new() };
-    Ok(Solution { result, metrics, report, warnings, map, fit, corners })
+    let corners = corners.map(|p| placed.place().restore(p));
+    Ok(Solution { result, metrics, report, warnings, map, placed, corner_errors, corners })
 }
 
-fn centroid(sampled: &SampledPatches) -> DVec3 {
-    let sum: DVec3 = sampled.samples.iter().map(|s| s.point).sum();
+fn bounds_of(surface: &HyperbolicNet) -> Result<BoundingBox, Error> {
+    BoundingBox::of(surface.net().positions().iter().copied()).ok_or(Error::NoVertex)
+}
+
+/// What the options ask for, in normalised coordinates.
+struct Transformation {
+    map: DarbouxMap,
+    c: Option<f64>,
+    fit: Option<CageFit>,
+}
+
+fn transformation(
+    placed: &PlacedNet,
+    corners: &[DVec3; 8],
+    options: &Options,
+) -> Result<Transformation, Error> {
+    if let Some(c) = options.c {
+        let ball = Ball::around(placed.net().net().positions()).ok_or(Error::NoVertex)?;
+        let map = DarbouxMap::new(c)?.in_frame(ball.center, ball.diameter())?;
+        return Ok(Transformation { map, c: Some(c), fit: None });
+    }
+    let mut images = *corners;
+    for corner in options.corners.iter() {
+        images[corner.index] = placed.place().apply(corner.point);
+    }
+    let fit = fit_cage(corners, &images, options.freedom)?;
+    Ok(Transformation { map: fit.map.clone(), c: fit.c, fit: Some(fit) })
+}
+
+/// The image in normalised coordinates, its accuracy and whether that suffices.
+fn sampled(
+    placed: &PlacedNet,
+    map: &DarbouxMap,
+    options: &Options,
+    observer: &mut dyn Observer,
+) -> Result<(SampledPatches, f64, Status), Error> {
+    let image = TransformedNet::new(placed.net(), map, options.branch)?;
+    let extent = BoundingBox::of(image.positions()?).map_or(1.0, BoundingBox::diagonal);
+    image.sample_within(ACCURACY * extent, observer)
+}
+
+/// Mean of the samples in normalised coordinates, where far models lose nothing to the sum.
+fn centroid(placed: &PlacedNet, sampled: &SampledPatches) -> DVec3 {
+    let sum: DVec3 = sampled.samples.iter().map(|s| placed.place().apply(s.point)).sum();
     sum / sampled.samples.len().max(1) as f64
 }
 

@@ -67,6 +67,13 @@ impl HyperbolicNet {
         Ok(Self { net, normals, shape })
     }
 
+    /// The same patches on a net of the same faces that stands elsewhere; Lelieuvre normals, which
+    /// depend on size, are left out.
+    #[must_use]
+    pub(crate) fn with_net(&self, net: QuadNet) -> Self {
+        Self { net, normals: None, shape: self.shape.clone() }
+    }
+
     /// The net.
     #[must_use]
     pub fn net(&self) -> &QuadNet {

@@ -8,6 +8,7 @@ mod hyperbolic_net;
 mod join;
 mod lelieuvre;
 mod patch;
+mod placed;
 mod quad_net;
 mod sample;
 mod shape;
@@ -23,6 +24,7 @@ pub use hyperbolic_net::{HyperbolicNet, KINK_SAMPLES, KinkStatistics, distances,
 pub use join::EdgeJoin;
 pub use lelieuvre::{LelieuvreStart, shape_parameters};
 pub use patch::{BilinearPatch, PatchJet, Quadric};
+pub use placed::PlacedNet;
 pub use quad_net::{Family, InnerEdge, NetEdge, QuadNet};
 pub use sample::{SampledPatches, SurfaceSample};
 pub use shape::{ShapeFit, Spread, best_log_factor, fit_shape_parameters};
