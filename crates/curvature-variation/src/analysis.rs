@@ -47,8 +47,9 @@ pub struct SurfaceAnalysis {
 /// # Example
 /// ```
 /// use curvature_variation::{Functional, analyze};
+/// use subdiv_catmull_clark::{Blend, Creases};
 /// let mesh = fixtures::quad_graphs::torus(64, 64, 1.0, 0.5);
-/// let found = analyze(&mesh, subdiv_catmull_clark::Blend::Smooth, None)?;
+/// let found = analyze(&mesh, &Creases::none(), Blend::Smooth, None)?;
 /// // π² / (ρ √(1 − ρ²)) for the ratio ρ of the radii.
 /// let willmore = std::f64::consts::PI.powi(2) / (0.5 * 0.75_f64.sqrt());
 /// assert!((found.energies.get(Functional::Willmore) / willmore - 1.0).abs() < 1e-4);
@@ -58,19 +59,20 @@ pub struct SurfaceAnalysis {
 /// ```
 pub fn analyze(
     mesh: &PolyMesh,
+    creases: &Creases,
     blend: Blend,
     blend_rings: Option<usize>,
 ) -> Result<SurfaceAnalysis, SubdivisionError> {
     check_valences(mesh)?;
-    let mut mesh = mesh.clone();
-    for _ in 0..refinements_needed(&mesh, &Creases::none()) {
+    let (mut mesh, mut creases) = (mesh.clone(), creases.clone());
+    for _ in 0..refinements_needed(&mesh, &creases) {
         // Fails for meshes too large to count only, which the caller's mesh already passed.
-        match refine(&mesh, &Creases::none()) {
-            Ok(fine) => mesh = fine.mesh,
+        match refine(&mesh, &creases) {
+            Ok(fine) => (mesh, creases) = (fine.mesh, fine.creases),
             Err(_) => break,
         }
     }
-    let surface = SubdivisionSurface::with_rings(&mesh, &Creases::none(), blend, blend_rings)?;
+    let surface = SubdivisionSurface::with_rings(&mesh, &creases, blend, blend_rings)?;
     let table = |quadrature| {
         energies(&mesh, &surface, false, quadrature, &mut || false)
             .unwrap_or_else(EnergyTable::unknown)

@@ -198,7 +198,7 @@ pub(crate) fn solve_level(
                 MetricAssembly::new(&surface, &evaluator, &freedom, &of.pulls, of.extra.as_ref())
             })?;
             let energy = level.energy.energy(&state.y).abs();
-            match level.left(&state.y, &mut watch)? {
+            match level.left(&state.y, tolerance, &mut watch)? {
                 // Stopped while it was looked at: the result stands, its status is not proven.
                 None => state.report.status = Status::Interrupted,
                 Some(left) if left.gain <= tolerance * energy => {}

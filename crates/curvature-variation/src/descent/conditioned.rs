@@ -12,8 +12,9 @@ use numerics::dot;
 /// How often a matrix that is not positive definite is given more of the Sobolev norm.
 const MENDINGS: usize = 12;
 
-/// Weight of the Sobolev norm where nothing is to be steered, only judged.
-const CERTIFYING: f64 = 1e-6;
+/// Weights of the Sobolev norm where nothing is to be steered, only judged: hardly any first, then so
+/// much that the energy follows its model over the length of the step.
+const CERTIFYING: [f64; 4] = [1e-6, 1e-4, 1e-2, 1.0];
 /// Parts of the step that are tried.
 const SHARES: [f64; 4] = [1.0, 0.3, 0.1, 0.03];
 
@@ -22,6 +23,8 @@ pub(crate) struct Left {
     /// The energy now.
     pub(crate) before: f64,
     pub(crate) gain: f64,
+    /// How many it took to tell.
+    pub(crate) factorizations: usize,
     /// The unknowns that bring it.
     pub(crate) y: Vec<f64>,
 }
@@ -120,13 +123,15 @@ impl<'a> Conditioned<'a> {
         Ok(Ok(0))
     }
 
-    /// What is left to gain from `y`: what a Gauss-Newton step with hardly any damping foresees,
-    /// `½ gᵀM⁻¹g` with the gradient on the conditions, or what a part of that step really brings,
-    /// whichever is less (where the matrix is all but singular it foresees anything). None if it was
-    /// stopped, or without a matrix.
+    /// What is left to gain from `y`: what Gauss-Newton steps with more and more damping foresee,
+    /// `½ gᵀM⁻¹g` with the gradient on the conditions, or what a part of such a step really brings,
+    /// whichever is less. Where the matrix is all but singular a step with hardly any damping foresees
+    /// anything and brings nothing, and one with more tells. Steps are tried until one brings more
+    /// than the tolerance of the energy or foresees less. None if it was stopped, or without a matrix.
     pub(crate) fn left(
         &mut self,
         y: &[f64],
+        tolerance: f64,
         observer: &mut dyn Observer,
     ) -> Result<Option<Left>, SolverError> {
         if self.steering.metric.is_none() {
@@ -135,27 +140,34 @@ impl<'a> Conditioned<'a> {
         self.energy.refresh(y);
         let mut gradient = vec![0.0; y.len()];
         let before = self.energy.value(y, &mut gradient);
+        let enough = tolerance * before.abs();
         let rows = self.condition_rows(y);
-        self.keep(Vec::new(), false);
-        if self.factor(y, true, CERTIFYING, observer)?.is_err() {
-            return Ok(None);
-        }
-        self.energy.refresh(y);
-        self.keep(rows, true);
-        let mut step = gradient.clone();
-        self.steering.apply_inverse(&mut step);
-        let foreseen = 0.5 * dot(&gradient, &step);
-        let mut left = Left { before, gain: 0.0, y: y.to_vec() };
+        let mut left = Left { before, gain: 0.0, factorizations: 0, y: y.to_vec() };
         let mut unused = vec![0.0; y.len()];
-        for share in SHARES {
-            let trial: Vec<f64> = y.iter().zip(&step).map(|(y, s)| y - share * s).collect();
-            let gain = before - self.energy.value(&trial, &mut unused);
-            // A step that leads where the energy is no number brings nothing.
-            if gain > left.gain {
-                (left.gain, left.y) = (gain, trial);
+        for damping in CERTIFYING {
+            self.keep(Vec::new(), false);
+            let Ok(factorizations) = self.factor(y, true, damping, observer)? else {
+                return Ok(None);
+            };
+            left.factorizations += factorizations;
+            self.energy.refresh(y);
+            self.keep(rows.clone(), true);
+            let mut step = gradient.clone();
+            self.steering.apply_inverse(&mut step);
+            let foreseen = 0.5 * dot(&gradient, &step);
+            for share in SHARES {
+                let trial: Vec<f64> = y.iter().zip(&step).map(|(y, s)| y - share * s).collect();
+                let gain = (before - self.energy.value(&trial, &mut unused)).min(foreseen);
+                // A step that leads where the energy is no number brings nothing.
+                if gain > left.gain {
+                    (left.gain, left.y) = (gain, trial);
+                }
+            }
+            // More damping foresees less.
+            if foreseen <= enough || left.gain > enough {
+                break;
             }
         }
-        left.gain = left.gain.min(foreseen);
         Ok(Some(left))
     }
 

@@ -123,7 +123,7 @@ impl State {
         self.record(left.before, record);
         self.y = left.y;
         self.report.iterations += 1;
-        self.report.factorizations += 1;
+        self.report.factorizations += left.factorizations;
         self.report.status = Status::IterationLimit;
         let is_all = plan.method == Method::GaussNewton;
         self.phase = if is_all { Phase::Newton } else { Phase::Rounds };
