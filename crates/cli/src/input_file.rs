@@ -5,6 +5,7 @@ use crate::failure::Failure;
 use bspline::BsplineSurface;
 use exchange::{Mesh, Model, NamedSurface, Pick, PickError};
 use std::path::Path;
+use subdiv_catmull_clark::{CreaseList, Creases};
 
 /// `--surface`, for commands that work on surfaces.
 #[derive(Clone, Debug, Default, clap::Args)]
@@ -49,6 +50,29 @@ pub(crate) fn read_surface(
     let model = read(context, path, surface, &PartArgs::default())?;
     let named = model.only_surface().map_err(|e| refused(path, &e))?.clone();
     Ok((model, named))
+}
+
+/// The sharp edges and vertices that the file of a control mesh gives it. What is to be said of them
+/// joins `warnings`.
+pub(crate) fn creases(
+    path: &Path,
+    mesh: &Mesh,
+    warnings: &mut Vec<String>,
+) -> Result<Creases, Failure> {
+    if mesh.sharpness.is_empty() {
+        return Ok(Creases::none());
+    }
+    let list = CreaseList {
+        edges: mesh.sharpness.edges.iter().map(|&([a, b], s)| ((a, b), s)).collect(),
+        corners: mesh.sharpness.vertices.iter().filter(|(_, s)| *s > 0.0).map(|c| c.0).collect(),
+    };
+    let soft = mesh.sharpness.vertices.iter().find(|(_, s)| *s > 0.0 && s.is_finite());
+    warnings.extend(soft.map(|(vertex, sharpness)| {
+        format!("vertex {vertex} has sharpness {sharpness}; a corner of any sharpness stays sharp")
+    }));
+    warnings.extend(list.note());
+    let control = mesh.to_poly_mesh().map_err(|e| Failure::input(path, e))?;
+    list.for_mesh(&control).map_err(|e| Failure::input(path, e))
 }
 
 /// The content of a file beside the input, its meshes mended as those of the input.

@@ -30,6 +30,7 @@ mod model;
 mod net;
 mod obj;
 mod obj_freeform;
+mod obj_tags;
 mod off;
 mod places;
 mod ply;
@@ -60,7 +61,7 @@ pub use format::{
 pub use glb::{read_glb, write_glb};
 pub use json::{read_json, write_compas, write_geomdl};
 pub use mend::WELD_SHARE;
-pub use mesh::{Field, Group, IndexLists, Mesh};
+pub use mesh::{Field, Group, IndexLists, Mesh, Sharpness};
 pub use model::{Model, NamedSurface, PointGrid};
 pub use net::{Net, read_net, write_net};
 pub use obj::{read_obj, write_obj, write_obj_and_materials};

@@ -82,6 +82,7 @@ impl Mesh {
             colors: picked(&self.colors, &kept),
             vertex_fields: self.vertex_fields.clone(),
             face_fields: self.face_fields.clone(),
+            sharpness: self.sharpness.renumbered(|v| Some(to(v))),
         };
         for field in &mut welded.vertex_fields {
             field.values = picked(&field.values, &kept);

@@ -88,6 +88,42 @@ pub struct Field {
     pub values: Vec<f64>,
 }
 
+/// Sharpness of edges and vertices of a control mesh, as OBJ's tags `crease` and `corner` give it.
+///
+/// # Example
+/// ```
+/// let text = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nf 1 2 3 4\nt crease 2/1/0 0 1 2.5\n";
+/// let model = exchange::read_obj(text)?;
+/// assert_eq!(model.meshes[0].sharpness.edges, [([0, 1], 2.5)]);
+/// assert!(exchange::write_obj(&model.meshes).contains("t crease 2/1/0 0 1 2.5"));
+/// # Ok::<(), exchange::ReadError>(())
+/// ```
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Sharpness {
+    /// Edges by their ends, which are refined by the crease masks so many times; infinite if they
+    /// stay sharp for ever.
+    pub edges: Vec<([u32; 2], f64)>,
+    /// Vertices likewise.
+    pub vertices: Vec<(u32, f64)>,
+}
+
+impl Sharpness {
+    /// Whether nothing is sharp.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.edges.is_empty() && self.vertices.is_empty()
+    }
+
+    /// The same of vertices with other numbers; what belongs to one that has none is left out.
+    pub(crate) fn renumbered(&self, to: impl Fn(u32) -> Option<u32>) -> Self {
+        let edge = |&([a, b], s): &([u32; 2], f64)| Some(([to(a)?, to(b)?], s));
+        Self {
+            edges: self.edges.iter().filter_map(edge).filter(|([a, b], _)| a != b).collect(),
+            vertices: self.vertices.iter().filter_map(|&(v, s)| Some((to(v)?, s))).collect(),
+        }
+    }
+}
+
 /// Polygons, polylines and loose points over one list of positions, with optional data on them.
 ///
 /// Optional lists are either empty or have one entry per vertex (or per face).
@@ -113,6 +149,8 @@ pub struct Mesh {
     pub vertex_fields: Vec<Field>,
     /// Numbers per face.
     pub face_fields: Vec<Field>,
+    /// Sharp edges and vertices of a control mesh.
+    pub sharpness: Sharpness,
 }
 
 impl Mesh {

@@ -6,6 +6,7 @@ use crate::error::{ReadError, clip};
 use crate::mesh::{Group, Mesh};
 use crate::model::{Model, NamedSurface};
 use crate::obj_freeform::{self, FreeForm, Vertices};
+use crate::obj_tags::{self, Tag};
 use crate::polyline::{PIECES, points_of, points_on};
 use crate::text_number::coordinate;
 use geom_core::DVec3;
@@ -54,8 +55,10 @@ struct Reader {
     model: Model,
     /// Polylines in place of curves, apart from the vertices of the file.
     curves: Vec<Mesh>,
-    /// Kinds of free-form geometry that are not read, with the line of the first.
+    /// Kinds of free-form geometry and tags that are not read, with the line of the first.
     unknown: Vec<(String, usize)>,
+    /// Line of the last tag that names vertices.
+    last_tag: usize,
 }
 
 impl Reader {
@@ -70,6 +73,7 @@ impl Reader {
                 self.group = words.collect::<Vec<_>>().join(" ");
                 Ok(())
             }
+            Some("t") => self.tag(words, number),
             // A curve of degree 1 is the polyline of its control points, behind two parameters.
             Some("curv") if self.degree_one => self.line(words.skip(2), number),
             Some(keyword) => {
@@ -81,6 +85,31 @@ impl Reader {
             }
             None => Ok(()),
         }
+    }
+
+    /// `t crease` and `t corner`; their vertices may come later, and are checked at the end.
+    fn tag<'a>(
+        &mut self,
+        words: impl Iterator<Item = &'a str>,
+        number: usize,
+    ) -> Result<(), ReadError> {
+        match obj_tags::read(words, number)? {
+            Tag::Crease(edge, sharpness) => {
+                self.mesh.sharpness.edges.push((edge, sharpness));
+                self.last_tag = number;
+            }
+            Tag::Corner(vertex, sharpness) => {
+                self.mesh.sharpness.vertices.push((vertex, sharpness));
+                self.last_tag = number;
+            }
+            Tag::Unknown(name) => {
+                let name = format!("tag {name}");
+                if !self.unknown.iter().any(|(known, _)| *known == name) {
+                    self.unknown.push((name, number));
+                }
+            }
+        }
+        Ok(())
     }
 
     fn free_form(&mut self, keyword: &str, words: &[&str], number: usize) -> Result<(), ReadError> {
@@ -209,6 +238,14 @@ impl Reader {
             let what = "the file has no vertex";
             return Err(ReadError::content(what, "export it again as polygons"));
         }
+        let sharp = &mesh.sharpness;
+        let named = sharp.edges.iter().flat_map(|(edge, _)| edge);
+        let largest = named.chain(sharp.vertices.iter().map(|(v, _)| v)).max();
+        if let Some(beyond) = largest.filter(|v| **v as usize >= mesh.positions.len()) {
+            let what = format!("a tag names vertex {beyond}");
+            let mend = format!("there are {}, counted from 0 in tags", mesh.positions.len());
+            return Err(ReadError::text(self.last_tag, what, mend));
+        }
         if let [only] = mesh.groups.as_slice() {
             // One group is no grouping; its name is the name of the object.
             mesh.name = only.name.clone();
@@ -217,7 +254,11 @@ impl Reader {
         }
         let mut model = self.model;
         for (kind, line) in self.unknown {
-            model.warnings.push(format!("line {line}: free-form `{kind}` geometry is left out"));
+            let what = match kind.strip_prefix("tag ") {
+                Some(tag) => format!("the tag `{tag}` of a control mesh"),
+                None => format!("free-form `{kind}` geometry"),
+            };
+            model.warnings.push(format!("line {line}: {what} is left out"));
         }
         if !self.curves.is_empty() {
             let count = self.curves.len();
@@ -301,6 +342,7 @@ fn write_mesh(text: &mut String, mesh: &Mesh, base: usize) {
     for line in mesh.lines.iter() {
         indices(text, "l", line, base);
     }
+    obj_tags::write(text, &mesh.sharpness, base - 1);
 }
 
 fn indices(text: &mut String, keyword: &str, list: &[u32], base: usize) {

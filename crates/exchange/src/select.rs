@@ -267,6 +267,10 @@ impl Mesh {
             let field = |f: &Field| Field { name: f.name.clone(), values: of(&f.values, kept) };
             fields.iter().map(field).collect()
         };
+        made.sharpness = self.sharpness.renumbered(|v| {
+            let is_kept = owners.get(v as usize) == Some(&piece);
+            is_kept.then(|| moved(&[v])[0])
+        });
         made.vertex_fields = fields(&self.vertex_fields, &kept);
         made.face_fields = fields(&self.face_fields, &faces);
         made

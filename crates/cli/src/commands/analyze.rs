@@ -174,8 +174,9 @@ fn measure(path: &Path, model: &Model, rings: Option<usize>) -> Result<Measured,
     if let [mesh] = with_faces[..]
         && corners(4)
     {
+        let creases = input_file::creases(path, mesh, &mut warnings)?;
         let mesh = mesh.to_poly_mesh().map_err(|e| Failure::input(path, e))?;
-        match curvature_variation::analyze(&mesh, Blend::Smooth, rings) {
+        match curvature_variation::analyze(&mesh, &creases, Blend::Smooth, rings) {
             Ok(found) => {
                 subdivision = Some(SubdivisionMetrics::new(&found));
                 let statistics = found.statistics;

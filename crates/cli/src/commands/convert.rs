@@ -10,7 +10,6 @@ use curvature_variation::limit_patches;
 use exchange::{LengthUnit, Mesh, Model, NamedSurface};
 use serde::Serialize;
 use std::path::{Path, PathBuf};
-use subdiv_catmull_clark::Creases;
 
 /// Arguments of `convert`.
 #[derive(Debug, clap::Args)]
@@ -86,7 +85,8 @@ impl Convert {
                 continue;
             }
             let control = mesh.to_poly_mesh().map_err(|e| Failure::input(&self.input, e))?;
-            let patches = limit_patches(&control, &Creases::none(), self.tolerance)
+            let creases = input_file::creases(&self.input, &mesh, &mut model.warnings)?;
+            let patches = limit_patches(&control, &creases, self.tolerance)
                 .map_err(|e| Failure::input(&self.input, e))?;
             caps += patches.caps;
             fitted += patches.fitted;

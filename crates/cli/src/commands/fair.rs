@@ -20,7 +20,7 @@ use report::{EnergyHistory, FieldScale, LineRole, LineSet, ScalarField, Series, 
 use serde::Deserialize;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
-use subdiv_catmull_clark::{CreaseList, Creases, SubdivisionSurface};
+use subdiv_catmull_clark::{CreaseList, SubdivisionSurface};
 
 /// Arguments of `fair`.
 #[derive(Debug, clap::Args)]
@@ -60,7 +60,7 @@ struct FileArgs {
     /// Stay among the blends of the input and this mesh of the same faces; repeatable
     #[arg(long, value_name = "QUADS")]
     family: Vec<PathBuf>,
-    /// Semi-sharp and sharp edges, corners
+    /// Semi-sharp and sharp edges, corners, in place of those of an OBJ file
     #[arg(long, value_name = "FILE.ron")]
     creases: Option<PathBuf>,
 }
@@ -147,7 +147,13 @@ impl Fair {
     fn read(&self, model: &mut Model) -> Result<Input, Failure> {
         let mesh = read_control_mesh(&self.input, model)?;
         let creases = match &self.files.creases {
-            None => Creases::none(),
+            None => {
+                let mut said = Vec::new();
+                let control = input_file::only_mesh(&self.input, model)?;
+                let creases = input_file::creases(&self.input, control, &mut said)?;
+                model.warnings.append(&mut said);
+                creases
+            }
             Some(path) => {
                 // An edge of sharpness `inf` stays sharp for ever.
                 let list: CreaseList =

@@ -114,6 +114,18 @@ impl<'a> Index<'a> {
     }
 }
 
+/// Bytes that a statement is made of: brackets, quotes, its end, and what a comment begins with.
+const MEANT: [bool; 256] = {
+    let mut meant = [false; 256];
+    let bytes = b"();'\"/";
+    let mut k = 0;
+    while k < bytes.len() {
+        meant[bytes[k] as usize] = true;
+        k += 1;
+    }
+    meant
+};
+
 /// A place in the text.
 #[derive(Clone, Debug)]
 pub(super) struct Cursor<'a> {
@@ -193,12 +205,16 @@ impl<'a> Cursor<'a> {
         let start = self.clone();
         let mut depth = 0_usize;
         loop {
-            self.space();
-            let Some(b) = self.peek() else {
+            // Most bytes of a file are digits, and mean nothing here.
+            let rest = &self.text[self.at..];
+            let Some(ordinary) = rest.iter().position(|b| MEANT[usize::from(*b)]) else {
                 let what = "the statement that begins here has no `;`";
                 return Err(start.error(what, "the file is truncated; copy or export it again"));
             };
+            self.at += ordinary;
+            let b = rest[ordinary];
             match b {
+                b'/' if rest[ordinary..].starts_with(b"/*") => self.space(),
                 b'\'' | b'"' => self.skip_quoted(b)?,
                 b';' if depth == 0 => {
                     self.at += 1;
