@@ -1,5 +1,9 @@
 //! What every target does.
 
+mod options;
+
+pub use options::{cage, checkpoint, constraints, creases, energy};
+
 use exchange::{decode_model, encode_model};
 use gp_solver::{Factorization, Method, Options, Problem, QuadraticBuilder};
 use std::path::PathBuf;
@@ -20,7 +24,7 @@ pub fn round_trip(extension: &str, bytes: &[u8]) {
 }
 
 /// Takes numbers off the front of the input; zeros when it is used up.
-struct Input<'b>(&'b [u8]);
+pub(crate) struct Input<'b>(pub(crate) &'b [u8]);
 
 impl Input<'_> {
     fn byte(&mut self) -> u8 {
@@ -30,7 +34,7 @@ impl Input<'_> {
     }
 
     /// Mostly small numbers, sometimes any bit pattern.
-    fn number(&mut self) -> f64 {
+    pub(crate) fn number(&mut self) -> f64 {
         match self.byte() {
             255 => f64::from_bits(u64::from_le_bytes(std::array::from_fn(|_| self.byte()))),
             254 => f64::from(self.byte()).exp2(),

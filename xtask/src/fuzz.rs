@@ -89,6 +89,25 @@ fn host() -> Outcome<String> {
     host.map(str::to_owned).ok_or_else(|| "rustc does not tell its host".to_owned())
 }
 
+/// What targets that are no formats begin with.
+const OPTION_SEEDS: &[(&str, &str)] = &[
+    ("creases", "(edges: [((0, 1), 2.0), ((1, 2), 9.5)], corners: [0, 3])"),
+    (
+        "fix",
+        "(vertices: [0, 1], limit_points: [(3, (0.0, 1.0, 2.0)), (4, None)], \
+         tangent_planes: [(3, (0.0, 0.0, 1.0))], weights: [(6, 10.0)], clamp_boundary: true)",
+    ),
+    ("energy", "0.92*bending + 0.08 mehlum_tarrou(1, 2) - f1"),
+    (
+        "checkpoint",
+        "{\"schema\":2,\"method\":\"fair\",\"fingerprint\":0,\"stage\":0,\"iteration\":1,\
+         \"numbers\":{\"y\":[0.5],\"damping\":[0.01],\"initial_energy\":[2.5]},\
+         \"counts\":{\"state\":[1,0,1,3,1]}}",
+    ),
+    ("cage", "\u{1}\u{2}\u{3}\u{4}\u{5}"),
+    ("solver", "\u{8}\u{1}\u{0}\u{10}\u{8}\u{2}"),
+];
+
 /// Files to begin with: fixtures of the format, and fixtures written in the format.
 fn write_seeds(target: &str, folder: &Path) -> Outcome {
     make(folder)?;
@@ -96,6 +115,9 @@ fn write_seeds(target: &str, folder: &Path) -> Outcome {
         let path = folder.join(name);
         fs::write(&path, bytes).map_err(|e| format!("{}: {e}", path.display()))
     };
+    for (name, text) in OPTION_SEEDS.iter().filter(|(name, _)| *name == target) {
+        return put(format!("{name}.ron"), text.as_bytes());
+    }
     // The name of a program cannot begin with a digit.
     let format = if target == "rhino" { "3dm" } else { target };
     if target == "rhino" {

@@ -1,6 +1,7 @@
 //! Chores of the workspace: `cargo xtask <chore>`.
 #![allow(clippy::print_stdout, reason = "chores talk to the person who runs them")]
 
+mod attack;
 mod bench;
 mod ci;
 mod dist;
@@ -8,6 +9,7 @@ mod fuzz;
 mod judges;
 mod nightly;
 mod regress;
+mod restarts;
 mod scene;
 mod shell;
 mod tidy;
@@ -24,6 +26,7 @@ cargo xtask <chore>
   judges                   let independent programs read what we write, where they are installed
   bench [PACKAGE…]         run the benches and record them in docs/benchmarks.md
   dist                     man pages and shell completions into target/dist
+  attack SECONDS [SEED]    throw hostile files, options and moments at the commands
   fuzz SECONDS [TARGET…]   fuzz the readers and the solver, each for so long
   nightly                  what takes too long for every change; writes docs/nightly.md
   bench --proof            run the solver on the public test sets, write docs/solver-proof.md
@@ -41,6 +44,8 @@ fn main() -> ExitCode {
         ["bench", "--proof"] => bench::proof(),
         ["nightly"] => nightly::run(),
         ["dist"] => dist::run(),
+        ["attack", seconds] => attack::run(seconds, "1").map(|told| println!("{told}")),
+        ["attack", seconds, seed] => attack::run(seconds, seed).map(|told| println!("{told}")),
         ["fuzz", seconds, targets @ ..] => fuzz::run(seconds, targets),
         ["bench", packages @ ..] => bench::run(packages),
         _ => {
