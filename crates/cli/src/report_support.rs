@@ -52,13 +52,12 @@ pub(crate) fn add_model(report: &mut Report, model: &Model) -> Result<(), Failur
         let name = if mesh.name.is_empty() { "mesh" } else { &mesh.name };
         report.stages.push(mesh_view(name, mesh, &report.length_unit)?);
     }
-    let (trimmed, whole): (Vec<_>, Vec<_>) = model.surfaces.iter().partition(|s| s.trim.is_some());
-    if !trimmed.is_empty() {
-        let mesh = exchange::joined_mesh("trimmed faces", trimmed);
+    if model.surfaces.iter().any(|s| s.trim.is_some()) {
+        // A part is looked at as a whole, whichever of its faces are trimmed.
+        let mesh = exchange::joined_mesh("faces", &model.surfaces);
         report.stages.push(mesh_view(&mesh.name, &mesh, &report.length_unit)?);
-    }
-    if !whole.is_empty() {
-        let surfaces: Vec<_> = whole.iter().map(|s| &s.surface).collect();
+    } else if !model.surfaces.is_empty() {
+        let surfaces: Vec<_> = model.surfaces.iter().map(|s| &s.surface).collect();
         let name = if surfaces.len() == 1 { "surface" } else { "surfaces" };
         report.stages.push(spline_view(name, &surfaces, None, &report.length_unit)?);
     }

@@ -62,7 +62,8 @@ impl<'a> TransformedNet<'a> {
         let per_patch = (cells + 1) * (cells + 1);
         let at = |k: usize| k as f64 / cells as f64;
         let grid = |patch: &BilinearPatch| -> Result<Vec<SurfaceSample>, Error> {
-            let cyclide = self.map.cyclide(patch);
+            let patch = patch.balanced();
+            let cyclide = self.map.cyclide(&patch);
             (0..per_patch)
                 .map(|k| {
                     let jet = patch.jet(at(k / (cells + 1)), at(k % (cells + 1)));

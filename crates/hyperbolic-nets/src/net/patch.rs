@@ -99,6 +99,14 @@ impl BilinearPatch {
         Self { corners: self.corners, weights: [1.0, 1.0, self.shape_parameter(), 1.0] }
     }
 
+    /// The same piece of quadric with the weights `(W^¼, W^−¼, W^¼, W^−¼)`, which are those of the
+    /// corners whichever of them comes first.
+    #[must_use]
+    pub fn balanced(&self) -> Self {
+        let root = self.shape_parameter().sqrt().sqrt();
+        Self { corners: self.corners, weights: [root, 1.0 / root, root, 1.0 / root] }
+    }
+
     /// Position at `(u, v)`.
     #[must_use]
     pub fn point(&self, u: f64, v: f64) -> DVec3 {
