@@ -5,6 +5,7 @@ use crate::scene::{Expectation, NamedScene, all, look_up};
 use crate::shell::{Outcome, build_umbilic, read, root, umbilic, write};
 use serde_json::Value;
 use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::Instant;
 
 /// Runs the scenes named (all if none is) and returns those skipped, each with the reason.
@@ -14,26 +15,17 @@ pub(crate) fn run(names: &[&str]) -> Outcome<Vec<String>> {
         return Err(format!("there is no scene {unknown} under fixtures/regress"));
     }
     build_umbilic()?;
-    let (mut skipped, mut missed, mut untrue) = (Vec::new(), 0, Vec::new());
+    let (mut skipped, mut wanted) = (Vec::new(), Vec::new());
     for scene in scenes.iter().filter(|s| names.is_empty() || names.contains(&s.name.as_str())) {
-        if let Some(reason) = missing_folder(scene) {
-            skipped.push(format!("regress {}: {reason}", scene.name));
-            continue;
+        match missing_folder(scene) {
+            Some(reason) => skipped.push(format!("regress {}: {reason}", scene.name)),
+            None => wanted.push(scene),
         }
-        let start = Instant::now();
-        let metrics = measure(scene)?;
-        println!("{} ({:.2} s)", scene.name, start.elapsed().as_secs_f64());
-        for (key, wanted) in &scene.scene.expect {
-            let got = look_up(&metrics, key);
-            let holds = wanted.holds(got);
-            missed += usize::from(!holds);
-            let got = got.map_or_else(|| "nothing".to_owned(), Value::to_string);
-            println!("  {} {key}: wanted {wanted}, got {got}", if holds { "ok  " } else { "MISS" });
-        }
-        if let Some(said) = differences(scene)? {
-            println!("  MISS verify: the files are not what the metrics say\n{said}");
-            untrue.push(scene.name.as_str());
-        }
+    }
+    let (mut missed, mut untrue) = (0, Vec::new());
+    for shown in side_by_side(&wanted)? {
+        missed += shown.missed;
+        untrue.extend(shown.untrue);
     }
     match (missed, untrue.is_empty()) {
         (0, true) => Ok(skipped),
@@ -44,6 +36,60 @@ pub(crate) fn run(names: &[&str]) -> Outcome<Vec<String>> {
             untrue.join(", ")
         )),
     }
+}
+
+/// How a scene came out.
+#[derive(Default)]
+struct Shown {
+    /// Values that are not as expected.
+    missed: usize,
+    /// The name, if its files are not what its metrics say.
+    untrue: Option<String>,
+}
+
+/// Runs scenes on two threads, which together keep two cores busy where one alone waits for a
+/// factorisation.
+fn side_by_side(scenes: &[&NamedScene]) -> Outcome<Vec<Shown>> {
+    let next = AtomicUsize::new(0);
+    let work = || -> Outcome<Vec<Shown>> {
+        let mut shown = Vec::new();
+        while let Some(scene) = scenes.get(next.fetch_add(1, Ordering::Relaxed)) {
+            shown.push(show(scene)?);
+        }
+        Ok(shown)
+    };
+    let halves = std::thread::scope(|scope| {
+        let other = scope.spawn(work);
+        let own = work();
+        [own, other.join().unwrap_or_else(|_| Err("a scene could not be run".to_owned()))]
+    });
+    let [own, other] = halves;
+    let mut all = own?;
+    all.extend(other?);
+    Ok(all)
+}
+
+/// Runs one scene and prints what came of it.
+fn show(scene: &NamedScene) -> Outcome<Shown> {
+    let start = Instant::now();
+    let metrics = measure(scene)?;
+    let mut text = format!("{} ({:.2} s)\n", scene.name, start.elapsed().as_secs_f64());
+    let mut shown = Shown::default();
+    for (key, wanted) in &scene.scene.expect {
+        let got = look_up(&metrics, key);
+        let holds = wanted.holds(got);
+        shown.missed += usize::from(!holds);
+        let got = got.map_or_else(|| "nothing".to_owned(), Value::to_string);
+        let verdict = if holds { "ok  " } else { "MISS" };
+        text += &format!("  {verdict} {key}: wanted {wanted}, got {got}\n");
+    }
+    if let Some(said) = differences(scene)? {
+        text += &format!("  MISS verify: the files are not what the metrics say\n{said}\n");
+        shown.untrue = Some(scene.name.clone());
+    }
+    // In one piece, since two scenes are shown at once.
+    print!("{text}");
+    Ok(shown)
 }
 
 /// What the program says of a scene whose files are not what its metrics claim.
