@@ -233,6 +233,21 @@ pub fn problem(input: &Input, options: &Options, phase: Phase) -> Result<Problem
 ///
 /// # Errors
 /// As [`problem`].
+///
+/// # Example
+/// ```
+/// use asymptotic_bezier::{CONTROL_POINTS, DataFile, Options, Phase, variables};
+/// # let text = std::fs::read_to_string("../../fixtures/asymptotic/catenoid.ron").unwrap();
+/// # let options = ron::Options::default()
+/// #     .with_default_extension(ron::extensions::Extensions::IMPLICIT_SOME);
+/// # let file: DataFile = options.from_str(&text)?;
+/// let unknowns = variables(&file.input()?, &Options::default(), Phase::Patch)?;
+/// let points = unknowns.group(CONTROL_POINTS)?;
+/// // A square net of points.
+/// let [u, v] = points.shape();
+/// assert_eq!((u, u * v), (v, points.len()));
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 pub fn variables(input: &Input, options: &Options, phase: Phase) -> Result<Variables, Error> {
     Ok(problem(input, options, phase)?.variables().clone())
 }

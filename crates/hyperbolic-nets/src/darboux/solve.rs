@@ -17,6 +17,20 @@ const ACCURACY: f64 = 1e-4;
 const CAGE_MARGIN: f64 = 0.05;
 
 /// Measures of an image.
+///
+/// # Example
+/// ```
+/// # use geom_core::PolyMesh;
+/// # use hyperbolic_nets::{Input, QuadNet, darboux};
+/// # let model = fixtures::asymptotic_nets::catenoid(20, 14);
+/// # let net = QuadNet::new(&PolyMesh::new(model.positions, &model.quads)?)?;
+/// # let skin = hyperbolic_nets::solve(&Input::new(&net), &Default::default(), &mut ())?;
+/// let options = darboux::Options { c: Some(-0.6), ..Default::default() };
+/// let metrics = darboux::solve(&skin.result, &options, &mut ())?.metrics;
+/// // Rulings become circles, and the image is as smooth as the net.
+/// assert!(metrics.circle_defect_max < 1e-9 && metrics.kink_max_deg < 1e-6);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Metrics {
     /// Patches.
@@ -60,6 +74,24 @@ pub enum Warning {
 }
 
 /// An image with what is to be said about it.
+///
+/// # Example
+/// The other image of the same map, in units of the model:
+/// ```
+/// # use geom_core::PolyMesh;
+/// # use hyperbolic_nets::{Input, QuadNet};
+/// use hyperbolic_nets::darboux::{Branch, Options, solve_placed};
+/// # let model = fixtures::asymptotic_nets::catenoid(20, 14);
+/// # let net = QuadNet::new(&PolyMesh::new(model.positions, &model.quads)?)?;
+/// # let skin = hyperbolic_nets::solve(&Input::new(&net), &Default::default(), &mut ())?;
+/// let options = Options { c: Some(-0.6), ..Default::default() };
+/// let image = solve_placed(skin.placed, &options, &mut ())?;
+/// let samples = image.result.samples.len();
+/// assert_eq!(samples, image.metrics.samples);
+/// let other = image.placed.sample_image(&image.map, Branch::Other, 4)?;
+/// assert!(other.samples[0].point.distance(image.result.samples[0].point) > 0.1);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Clone, Debug)]
 pub struct Solution {
     /// Points, normals and curvatures on all patches, dense enough for 10⁻⁴ of the size.
