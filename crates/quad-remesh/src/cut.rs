@@ -90,7 +90,9 @@ fn cut_graph(surface: &Surface, in_tree: &[[bool; 3]], is_singular: &BTreeSet<u3
     };
     let mut twigs: Vec<u32> = graph.keys().copied().filter(|&v| ends(&graph, v)).collect();
     while let Some(v) = twigs.pop() {
-        let Some(w) = graph.remove(&v).and_then(|ends| ends.keys().next().copied()) else { continue };
+        let Some(w) = graph.remove(&v).and_then(|ends| ends.keys().next().copied()) else {
+            continue;
+        };
         if let Some(back) = graph.get_mut(&w) {
             back.remove(&v);
             if back.is_empty() {
@@ -105,14 +107,9 @@ fn cut_graph(surface: &Surface, in_tree: &[[bool; 3]], is_singular: &BTreeSet<u3
 }
 
 /// Splits the cuts at their nodes; loops without a node are one piece each.
-fn segments(
-    surface: &Surface,
-    graph: &Graph,
-    is_singular: &BTreeSet<u32>,
-) -> Vec<Vec<(u32, u8)>> {
-    let is_node = |v: u32| {
-        graph[&v].len() != 2 || is_singular.contains(&v) || surface.on_border[v as usize]
-    };
+fn segments(surface: &Surface, graph: &Graph, is_singular: &BTreeSet<u32>) -> Vec<Vec<(u32, u8)>> {
+    let is_node =
+        |v: u32| graph[&v].len() != 2 || is_singular.contains(&v) || surface.on_border[v as usize];
     let mut done: BTreeSet<(u32, u32)> = BTreeSet::new();
     let mut out = Vec::new();
     let starts = graph.keys().copied();

@@ -44,7 +44,8 @@ impl Field {
             if known.is_empty() {
                 return Err(coarse());
             }
-            let sum = known.iter().fold(DMat3::ZERO, |sum, t| sum + *t) * (1.0 / known.len() as f64);
+            let sum =
+                known.iter().fold(DMat3::ZERO, |sum, t| sum + *t) * (1.0 / known.len() as f64);
             let (x, y) = (surface.x_axes[f], surface.y_axis(f));
             let (a, b, c) = (x.dot(sum * x), x.dot(sum * y), y.dot(sum * y));
             mean.push(0.5 * (a + c));
@@ -108,7 +109,13 @@ impl Field {
     ///
     /// Directions of the disc are compared in the tangent plane of its centre. `false`, and no
     /// change, if the disc bends away from it too far.
-    pub(crate) fn fill(&mut self, surface: &Surface, disc: &[u32], centre: usize, turns: i32) -> bool {
+    pub(crate) fn fill(
+        &mut self,
+        surface: &Surface,
+        disc: &[u32],
+        centre: usize,
+        turns: i32,
+    ) -> bool {
         let star = surface.star(centre);
         let normal = star.iter().map(|&(f, _)| surface.normals[f as usize]).sum::<DVec3>();
         let normal = normal.normalize_or_zero();
@@ -140,7 +147,11 @@ impl Field {
                         Some(&at) => (true, at),
                         None => {
                             let q = self.deviator[g as usize];
-                            rim.push((times(q.normalize_or_zero(), into(g as usize)), self.mean[g as usize], q.length()));
+                            rim.push((
+                                times(q.normalize_or_zero(), into(g as usize)),
+                                self.mean[g as usize],
+                                q.length(),
+                            ));
                             (false, rim.len() - 1)
                         }
                     })

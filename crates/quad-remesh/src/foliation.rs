@@ -10,10 +10,14 @@ use crate::whole::{Unknowns, Value};
 const SPACING: f64 = 0.05;
 /// Rounds in which the spacing follows the lines, and how far it may go from the wanted one.
 const ROUNDS: usize = 5;
-const SPACING_RANGE: [f64; 2] = [0.4, 2.5];
+const SPACING_RANGE: [f64; 2] = [0.7, 1.4];
+/// Range of spacings in which a wrong one counts as its share of the right one.
+const RELATIVE_RANGE: [f64; 2] = [0.25, 2.5];
 /// Least rise along both principal directions, in cells per edge length: then all triangles keep
 /// their orientation.
 const LEAST_RISE: f64 = 0.05;
+/// Share of that rise which may be missing where the steps end early.
+const NEARLY: f64 = 0.1;
 /// Largest move, in cells, by which the rows may want to change a value.
 const REACH: f64 = 20.0;
 /// Cuts of the whole numbers at most.
@@ -50,8 +54,9 @@ pub(crate) struct Ground<'a> {
 pub(crate) struct Foliation {
     pub(crate) reals: Vec<f64>,
     pub(crate) wholes: Vec<f64>,
-    /// Cuts that were needed, rows that hold as equations, steps of the interior point method.
+    /// Rows of whole numbers that were needed.
     pub(crate) cuts: usize,
+    /// Steps that turned triangles back over.
     pub(crate) steps: usize,
 }
 
@@ -114,7 +119,7 @@ impl Ground<'_> {
         });
         let mut qp = MixedQp::new(unknowns.reals, unknowns.wholes, groups)?;
         let (along, level) = (self.rows(&frames.along), self.rows(&frames.level));
-        let mut spacing = vec![1.0; along.len()];
+        let mut spacing = vec![[1.0; 2]; along.len()];
         for _ in 0..ROUNDS {
             fill(&mut qp, &along, &level, &spacing, &frames.weights);
             let eliminated = qp.eliminate(unknowns.held)?;
@@ -142,14 +147,16 @@ impl Ground<'_> {
         Err(Missing::Folds(first))
     }
 
-    /// Lets the wanted spacing follow the lines, within its range and with the same mean.
-    fn follow(&self, along: &[Row], reals: &[f64], wholes: &[f64], spacing: &mut [f64]) {
-        let [low, high] = SPACING_RANGE;
+    /// Lets the wanted rise follow the lines, within its range and with the same mean; and keeps
+    /// the rise there is.
+    fn follow(&self, along: &[Row], reals: &[f64], wholes: &[f64], spacing: &mut [[f64; 2]]) {
         for (s, row) in spacing.iter_mut().zip(along) {
-            *s = evaluate(row, reals, wholes).clamp(low, high);
+            let rise = evaluate(row, reals, wholes);
+            *s = [SPACING_RANGE, RELATIVE_RANGE].map(|[low, high]| rise.clamp(low, high));
         }
-        let mean = spacing.iter().map(|s| s.ln()).sum::<f64>() / spacing.len().max(1) as f64;
-        spacing.iter_mut().for_each(|s| *s /= mean.exp());
+        let sum: f64 = spacing.iter().map(|[s, _]| s.ln()).sum();
+        let mean = (sum / spacing.len().max(1) as f64).exp();
+        spacing.iter_mut().for_each(|[s, _]| *s /= mean);
     }
 
     /// Moves the real unknowns as little as must be for all rows to rise.
@@ -177,7 +184,8 @@ impl Ground<'_> {
             program.at_least(&real, *bound);
         }
         let solution = program.solve()?;
-        if solution.status == Status::Converged {
+        // Rounding may end the last steps early, which matters to nobody once all rows rise.
+        if solution.status == Status::Converged || solution.violation < NEARLY * LEAST_RISE {
             reals.iter_mut().zip(&solution.x).for_each(|(y, d)| *y += d);
             let steps = solution.iterations;
             return Ok(Unfolded::Sound(Foliation { reals, wholes, cuts: 0, steps }));
@@ -244,11 +252,13 @@ enum Unfolded {
     Local(usize),
 }
 
-fn fill(qp: &mut MixedQp, along: &[Row], level: &[Row], spacing: &[f64], weights: &[f64]) {
+fn fill(qp: &mut MixedQp, along: &[Row], level: &[Row], spacing: &[[f64; 2]], weights: &[f64]) {
     qp.clear();
     for f in 0..along.len() {
+        let [wanted, there] = spacing[f];
         qp.square(&level[f], 0.0, weights[f]);
-        qp.square(&along[f], spacing[f], SPACING * weights[f]);
+        // An edge twice too long counts as much as one of half its length.
+        qp.square(&along[f], wanted, SPACING * weights[f] / (there * there));
     }
 }
 

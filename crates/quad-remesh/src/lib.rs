@@ -33,6 +33,7 @@ mod metrics;
 mod net;
 mod options;
 mod parameters;
+mod refine;
 mod repair;
 mod singular;
 mod solve;

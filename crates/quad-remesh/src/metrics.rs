@@ -24,6 +24,11 @@ pub struct Metrics {
     pub index_sum: f64,
     /// Whole numbers each of the two functions had to choose.
     pub whole_numbers: usize,
+    /// Rows that kept these whole numbers from making the net fold.
+    pub whole_number_cuts: usize,
+    /// Steps, of both functions together, that turned folded triangles back over; none where nothing
+    /// folded.
+    pub unfolding_steps: usize,
     /// Triangles that the layout turns over: none, since nets with such are refused.
     pub folded_triangles: usize,
     /// Edge length the net was made with, in model units.
@@ -71,7 +76,8 @@ pub(crate) fn shape(mesh: &PolyMesh) -> [f64; 4] {
 
 /// Inner vertices whose valence is not 4, and those with an odd one.
 pub(crate) fn irregular(mesh: &PolyMesh) -> (usize, usize) {
-    let inner = mesh.vertices().filter(|&v| mesh.outgoing(v).is_some() && !mesh.is_boundary_vertex(v));
+    let inner =
+        mesh.vertices().filter(|&v| mesh.outgoing(v).is_some() && !mesh.is_boundary_vertex(v));
     let valences: Vec<usize> = inner.map(|v| mesh.valence(v)).collect();
     let count = |is: fn(&usize) -> bool| valences.iter().filter(|v| is(v)).count();
     (count(|v| *v != 4), count(|v| v % 2 == 1))

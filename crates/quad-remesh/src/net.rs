@@ -6,15 +6,11 @@ use geom_core::DVec3;
 
 use crate::trace::Cells;
 
-/// Quads that form a manifold, and where they come from.
+/// Quads that form a manifold.
 #[derive(Clone, Debug)]
 pub(crate) struct Net {
     pub(crate) positions: Vec<DVec3>,
     pub(crate) quads: Vec<[u32; 4]>,
-    /// The triangle with the middle of each quad.
-    pub(crate) middles: Vec<u32>,
-    /// Vertex of the surface that a vertex stands on, if it does.
-    pub(crate) vertices: Vec<Option<u32>>,
     /// Cells that were left out.
     pub(crate) dropped: usize,
 }
@@ -43,7 +39,7 @@ fn across(quads: &[[u32; 4]]) -> Across {
 /// Keeps the largest part of the cells, without cells that hang on by one side and without corners
 /// at which parts only touch.
 pub(crate) fn assemble(cells: Cells) -> Net {
-    let Cells { positions, quads, middles, vertices, .. } = cells;
+    let Cells { positions, quads } = cells;
     let count = quads.len();
     let is_whole = |q: &[u32; 4]| (0..4).all(|i| (0..i).all(|j| q[i] != q[j]));
     let mut kept: Vec<usize> = (0..count).filter(|&f| is_whole(&quads[f])).collect();
@@ -64,18 +60,11 @@ pub(crate) fn assemble(cells: Cells) -> Net {
         }
     }
     let mut numbers = vec![None; positions.len()];
-    let mut net = Net {
-        positions: Vec::new(),
-        quads: Vec::new(),
-        middles: kept.iter().map(|&f| middles[f]).collect(),
-        vertices: Vec::new(),
-        dropped: count - kept.len(),
-    };
+    let mut net = Net { positions: Vec::new(), quads: Vec::new(), dropped: count - kept.len() };
     for &f in &kept {
         net.quads.push(quads[f].map(|v| {
             *numbers[v as usize].get_or_insert_with(|| {
                 net.positions.push(positions[v as usize]);
-                net.vertices.push(vertices[v as usize]);
                 net.positions.len() as u32 - 1
             })
         }));

@@ -41,7 +41,11 @@ impl Options {
         if let Some(value) = self.edge_length
             && !(value > 0.0 && value.is_finite())
         {
-            return Err(Error::BadOption { name: "edge_length", value, need: "positive and finite" });
+            return Err(Error::BadOption {
+                name: "edge_length",
+                value,
+                need: "positive and finite",
+            });
         }
         if let Some(faces) = self.faces
             && !(1..=1_000_000).contains(&faces)

@@ -2,7 +2,7 @@
 
 use crate::cut::Cut;
 use crate::foliation::{Foliation, Ground};
-use crate::surface::Surface;
+use crate::surface::{NONE, Surface};
 
 /// Coordinates are whole multiples of `2⁻²⁸` of a cell. With up to `2³⁰` cells differences take 59
 /// bits and products fit into 128.
@@ -35,11 +35,6 @@ impl Step {
         let by = Place { u: -self.sign * self.by.u, v: -self.sign * self.by.v };
         Self { sign: self.sign, by }
     }
-
-    /// Whether directions turn over.
-    pub(crate) fn turns(self) -> bool {
-        self.sign < 0
-    }
 }
 
 /// Twice the area of a triangle in the plane; positive if it is counter-clockwise.
@@ -63,9 +58,10 @@ impl Parameters {
                 let real = value.real.map_or(0, |(i, sign)| {
                     sign as i64 * (f.reals[i as usize] * CELL as f64).round() as i64
                 });
-                let whole = value.whole.iter().map(|&(k, c)| {
-                    c as i64 * f.wholes[k as usize].round() as i64 * CELL
-                });
+                let whole = value
+                    .whole
+                    .iter()
+                    .map(|&(k, c)| c as i64 * f.wholes[k as usize].round() as i64 * CELL);
                 real + whole.sum::<i64>()
             };
             Place { u: snapped(u), v: snapped(v) }
@@ -75,7 +71,8 @@ impl Parameters {
         let mut steps = vec![[Step::NONE; 3]; ground.surface.triangles.len()];
         for (segment, step) in cut.segments.iter().zip(&ground.unknowns.steps) {
             let by = |f: &Foliation| -> i64 {
-                let whole = step.iter().map(|&(k, c)| c as i64 * f.wholes[k as usize].round() as i64);
+                let whole =
+                    step.iter().map(|&(k, c)| c as i64 * f.wholes[k as usize].round() as i64);
                 whole.sum::<i64>() * CELL
             };
             let step = Step { sign: i64::from(segment.sign), by: Place { u: by(u), v: by(v) } };
@@ -112,12 +109,11 @@ impl Parameters {
     }
 
     /// Whether every inner side of a triangle is the same segment for both of its triangles.
-    #[cfg(test)]
     pub(crate) fn fits(&self, surface: &Surface) -> bool {
         (0..self.corners.len()).all(|f| {
             (0..3).all(|k| {
                 let g = surface.across[f][k];
-                if g == crate::surface::NONE {
+                if g == NONE {
                     return true;
                 }
                 let (g, c) = (g as usize, self.corners[f]);

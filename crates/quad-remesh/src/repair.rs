@@ -112,7 +112,9 @@ fn has_area(points: &[DVec3], t: &[u32; 3]) -> bool {
     let [a, b, c] = t.map(|v| points[v as usize]);
     let longest = (b - a).length_squared().max((c - b).length_squared());
     let longest = longest.max((a - c).length_squared());
-    t[0] != t[1] && t[1] != t[2] && t[2] != t[0]
+    t[0] != t[1]
+        && t[1] != t[2]
+        && t[2] != t[0]
         && (b - a).cross(c - a).length() > DEGENERATE * longest
 }
 
@@ -176,10 +178,7 @@ fn split_vertices(triangles: &[[u32; 3]]) -> Result<(Vec<[u32; 3]>, Vec<u32>, us
 }
 
 /// The edge-connected part with the largest area, its vertices numbered anew, and the number of parts.
-fn largest_part(
-    points: &[DVec3],
-    triangles: Vec<[u32; 3]>,
-) -> (Vec<DVec3>, Vec<[u32; 3]>, usize) {
+fn largest_part(points: &[DVec3], triangles: Vec<[u32; 3]>) -> (Vec<DVec3>, Vec<[u32; 3]>, usize) {
     let across = neighbours(&triangles);
     let mut part = vec![NONE; triangles.len()];
     let mut areas: Vec<f64> = Vec::new();

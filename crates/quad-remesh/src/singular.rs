@@ -3,6 +3,7 @@
 use std::f64::consts::{PI, TAU};
 
 use crate::field::Field;
+use crate::refine::refine;
 use crate::surface::{NONE, Surface};
 
 /// Rounds of filling until no point of positive index is left.
@@ -16,6 +17,9 @@ const CLUSTER: f64 = 1.0;
 /// A vertex around which the plane turns `4 + 2 m` quarters has at least `3 (m + 2)` triangles, if it
 /// is not as ordinary as `m = 1`.
 const TRIANGLES_PER_HALF_TURN: usize = 3;
+
+/// Triangles are halved within this many edge lengths of a vertex with many turns.
+const OPENED: f64 = 0.4;
 
 /// How directions go from triangle to triangle.
 #[derive(Clone, Debug)]
@@ -96,7 +100,7 @@ pub(crate) fn singular_vertices(surface: &Surface, matching: &Matching) -> Vec<S
 /// cancelled against negative ones near by, and clusters of negative ones become one vertex each.
 ///
 /// Everything is local: discs around these points get a harmonic field, the rest keeps its own.
-pub(crate) fn settle(surface: &mut Surface, field: &mut Field, edge: f64) -> Vec<Singular> {
+pub(crate) fn settle(surface: &mut Surface, field: &mut Field, edge: f64) {
     cancel(surface, field, edge);
     let found = singular_vertices(surface, &Matching::new(surface, field));
     for cluster in clusters(surface, &found, CLUSTER * edge) {
@@ -105,13 +109,25 @@ pub(crate) fn settle(surface: &mut Surface, field: &mut Field, edge: f64) -> Vec
     // A merge near another cluster may have stirred it.
     cancel(surface, field, edge);
     let found = singular_vertices(surface, &Matching::new(surface, field));
-    for s in &found {
-        let wanted = TRIANGLES_PER_HALF_TURN * (2 + s.twice_index.unsigned_abs() as usize);
-        while s.twice_index < -1 && surface.star(s.vertex).len() < wanted {
-            split_link(surface, field, s.vertex);
-        }
+    for s in found {
+        open_star(surface, field, s.vertex, s.twice_index, OPENED * edge);
     }
-    found
+}
+
+/// Gives a vertex enough triangles for its turns, since more than a quarter turn of the directions
+/// from one to the next could not be told from less, and the triangles around it as many.
+fn open_star(surface: &mut Surface, field: &mut Field, v: usize, twice_index: i32, radius: f64) {
+    let wanted = TRIANGLES_PER_HALF_TURN * (2 + twice_index.unsigned_abs() as usize);
+    if twice_index >= -1 || surface.star(v).len() >= wanted {
+        return;
+    }
+    while surface.star(v).len() < wanted {
+        let opposite = surface.star(v).iter().map(|&(f, k)| (f, (k + 1) % 3)).collect::<Vec<_>>();
+        refine(surface, field, &opposite);
+    }
+    let disc = surface.disc(v, radius);
+    let sides: Vec<(u32, u8)> = disc.iter().flat_map(|&f| [(f, 0), (f, 1), (f, 2)]).collect();
+    refine(surface, field, &sides);
 }
 
 fn cancel(surface: &Surface, field: &mut Field, edge: f64) {
@@ -160,7 +176,7 @@ fn clusters(surface: &Surface, found: &[Singular], distance: f64) -> Vec<Vec<usi
 /// Makes one vertex of a cluster, if a disc around it holds neither a border nor a handle nor
 /// another singular point.
 fn merge(
-    surface: &Surface,
+    surface: &mut Surface,
     field: &mut Field,
     found: &[Singular],
     cluster: &[usize],
@@ -178,7 +194,8 @@ fn merge(
         away(a).total_cmp(&away(b)).then(a.cmp(&b))
     });
     let Some(centre) = nearest else { return false };
-    let disc = surface.disc(centre, reach + 0.75 * edge);
+    let radius = reach + 0.75 * edge;
+    let disc = surface.disc(centre, radius);
     if !is_disc(surface, &disc) {
         return false;
     }
@@ -190,6 +207,10 @@ fn merge(
         return false;
     }
     let turns: i32 = held.iter().map(|s| s.twice_index).sum();
+    open_star(surface, field, centre, turns, OPENED * edge);
+    let disc = surface.disc(centre, radius);
+    let inside: std::collections::BTreeSet<u32> =
+        disc.iter().flat_map(|&f| surface.triangles[f as usize]).collect();
     let before = (field.mean.clone(), field.deviator.clone());
     if turns >= 0 || !field.fill(surface, &disc, centre, -turns) {
         return false;
@@ -209,8 +230,7 @@ fn merge(
 
 /// Whether triangles form a disc away from the border.
 fn is_disc(surface: &Surface, disc: &[u32]) -> bool {
-    let mut vertices: Vec<u32> =
-        disc.iter().flat_map(|&f| surface.triangles[f as usize]).collect();
+    let mut vertices: Vec<u32> = disc.iter().flat_map(|&f| surface.triangles[f as usize]).collect();
     vertices.sort_unstable();
     vertices.dedup();
     if vertices.iter().any(|&v| surface.on_border[v as usize]) {
@@ -223,62 +243,4 @@ fn is_disc(surface: &Surface, disc: &[u32]) -> bool {
     }
     let edges = 3 * disc.len() - inner / 2;
     vertices.len() + disc.len() == edges + 1
-}
-
-/// Cuts the triangles at a vertex, and those opposite, in two, so that twice as many meet there.
-fn split_link(surface: &mut Surface, field: &mut Field, v: usize) {
-    let star: Vec<(usize, usize)> =
-        surface.star(v).iter().map(|&(f, k)| (f as usize, k as usize)).collect();
-    let mut positions = surface.positions.clone();
-    let mut triangles = surface.triangles.clone();
-    // Each piece with the triangle it is a part of, whose plane it shares.
-    let mut pieces: Vec<(usize, usize)> = Vec::new();
-    for &(f, k) in &star {
-        let t = triangles[f];
-        let (a, b) = (t[(k + 1) % 3], t[(k + 2) % 3]);
-        let middle = positions.len() as u32;
-        positions.push(0.5 * (positions[a as usize] + positions[b as usize]));
-        triangles[f] = [t[k], a, middle];
-        pieces.push((triangles.len(), f));
-        triangles.push([t[k], middle, b]);
-        let g = surface.across[f][(k + 1) % 3];
-        if g != NONE {
-            // The neighbour may have been cut already, then the piece with this side is cut.
-            let g = g as usize;
-            let candidates = std::iter::once(g)
-                .chain(pieces.iter().filter(|(_, source)| *source == g).map(|(p, _)| *p));
-            let has = |p: &usize| {
-                let t = triangles[*p];
-                (0..3).any(|l| (t[l], t[(l + 1) % 3]) == (b, a))
-            };
-            let owner = candidates.into_iter().find(has);
-            if let Some(p) = owner {
-                let t = triangles[p];
-                let l = (0..3).find(|&l| t[l] == b).unwrap_or(0);
-                let top = t[(l + 2) % 3];
-                triangles[p] = [top, b, middle];
-                pieces.push((triangles.len(), g));
-                triangles.push([top, middle, a]);
-            }
-        }
-    }
-    let old = surface.clone();
-    let changed: Vec<(usize, usize)> = {
-        let mut list = pieces.clone();
-        list.extend(pieces.iter().map(|&(_, source)| (source, source)));
-        list.sort_unstable();
-        list.dedup();
-        list
-    };
-    *surface = Surface::new(positions, triangles);
-    field.mean.resize(surface.triangles.len(), 0.0);
-    field.deviator.resize(surface.triangles.len(), geom_core::DVec2::ZERO);
-    let sources: Vec<(f64, geom_core::DVec2)> =
-        changed.iter().map(|&(_, s)| (field.mean[s], field.deviator[s])).collect();
-    for (&(piece, source), (mean, deviator)) in changed.iter().zip(sources) {
-        let axis = surface.local(piece, old.x_axes[source]);
-        let turn = 2.0 * axis.y.atan2(axis.x);
-        field.mean[piece] = mean;
-        field.deviator[piece] = crate::field::times(deviator, crate::field::unit(turn));
-    }
 }

@@ -88,9 +88,9 @@ pub fn solve<F: AsRef<[u32]>>(
     let surface = Surface::new(positions, surface.triangles);
     let scale = place.scale();
     let mut run = Run { surface, options, observer, warnings: Vec::new() };
-    let made = run.net(options.edge_length.map(|l| l * scale))?;
+    let made = run.net(options.edge_length.map(|l| l * scale)).map_err(|e| restored(e, &place))?;
     warnings.append(&mut run.warnings);
-    let restored = |list: &[DVec3]| list.iter().map(|&p| place.restore(p)).collect::<Vec<_>>();
+    let in_model = |list: &[DVec3]| list.iter().map(|&p| place.restore(p)).collect::<Vec<_>>();
     let no_cell = || Error::NoCell {
         edge_length: made.edge / scale,
         suggestion: SHORTER * SHORTER * made.edge / scale,
@@ -100,6 +100,9 @@ pub fn solve<F: AsRef<[u32]>>(
     }
     let mesh = PolyMesh::new(made.net.positions.clone(), &made.net.quads).map_err(|_| no_cell())?;
     let metrics = made.measure(&run, &mesh, scale);
+    if made.net.dropped > 0 {
+        warnings.push(Warning::CellsLeftOut { cells: made.net.dropped });
+    }
     if let (Some(asked), used) = (options.edge_length, made.edge / scale)
         && used < 0.99 * asked
     {
@@ -113,9 +116,9 @@ pub fn solve<F: AsRef<[u32]>>(
     let surface = &run.surface;
     let singular = made.singular.iter();
     Ok(Solution {
-        result: PolyMesh::new(restored(&made.net.positions), &made.net.quads)
+        result: PolyMesh::new(in_model(&made.net.positions), &made.net.quads)
             .map_err(|_| no_cell())?,
-        surface: PolyMesh::new(restored(&surface.positions), &surface.triangles)
+        surface: PolyMesh::new(in_model(&surface.positions), &surface.triangles)
             .map_err(|_| no_cell())?,
         metrics,
         status,
@@ -124,6 +127,22 @@ pub fn solve<F: AsRef<[u32]>>(
             .collect(),
         warnings,
     })
+}
+
+/// An error in units of the model.
+fn restored(error: Error, place: &Normalization) -> Error {
+    let scale = place.scale();
+    match error {
+        Error::Folds { edge_length, x, y, z, suggestion } => {
+            let p = place.restore(DVec3::new(x, y, z));
+            let (edge_length, suggestion) = (edge_length / scale, suggestion / scale);
+            Error::Folds { edge_length, x: p.x, y: p.y, z: p.z, suggestion }
+        }
+        Error::NoCell { edge_length, suggestion } => {
+            Error::NoCell { edge_length: edge_length / scale, suggestion: suggestion / scale }
+        }
+        other => other,
+    }
 }
 
 struct Run<'a> {
@@ -140,7 +159,9 @@ struct Made {
     frames: [Frames; 2],
     gradients: [Vec<DVec3>; 2],
     singular: Vec<Singular>,
-    unknowns: Unknowns,
+    wholes: usize,
+    cuts: usize,
+    steps: usize,
     negative_share: f64,
 }
 
@@ -250,6 +271,7 @@ impl Run<'_> {
         };
         let (u, v) = (u.map_err(refused)?, v.map_err(refused)?);
         let parameters = Parameters::new(&ground, cut, &u, &v);
+        debug_assert!(parameters.fits(surface), "both sides of every cut are the same");
         if let Some(f) = parameters.folded().next() {
             return Err(refused(Missing::Folds(f)));
         }
@@ -268,7 +290,9 @@ impl Run<'_> {
             frames: frames.clone(),
             gradients,
             singular: singular.clone(),
-            unknowns: unknowns.clone(),
+            wholes: unknowns.wholes,
+            cuts: u.cuts + v.cuts,
+            steps: u.steps + v.steps,
             negative_share: *negative_share,
         })
     }
@@ -300,7 +324,9 @@ impl Made {
             surface_euler_characteristic: surface.euler_characteristic(),
             singular_points: self.singular.len(),
             index_sum: self.singular.iter().map(|s| 0.5 * f64::from(s.twice_index)).sum(),
-            whole_numbers: self.unknowns.wholes,
+            whole_numbers: self.wholes,
+            whole_number_cuts: self.cuts,
+            unfolding_steps: self.steps,
             folded_triangles: 0,
             edge_length: self.edge / scale,
             edge_length_mean: mean / scale,

@@ -161,17 +161,6 @@ impl Surface {
         used as i64 - edges as i64 + self.triangles.len() as i64
     }
 
-    /// Length of all borders.
-    pub(crate) fn border_length(&self) -> f64 {
-        let mut sum = 0.0;
-        for (f, sides) in self.across.iter().enumerate() {
-            let p = self.corners(f);
-            let open = (0..3).filter(|&k| sides[k] == NONE);
-            sum += open.map(|k| p[k].distance(p[(k + 1) % 3])).sum::<f64>();
-        }
-        sum
-    }
-
     pub(crate) fn to_tri_mesh(&self) -> Result<TriMesh, geom_core::MeshError> {
         TriMesh::new(self.positions.clone(), self.triangles.clone())
     }

@@ -34,49 +34,27 @@ struct End {
 pub(crate) struct Cells {
     pub(crate) positions: Vec<DVec3>,
     pub(crate) quads: Vec<[u32; 4]>,
-    /// The triangle with the middle of each quad.
-    pub(crate) middles: Vec<u32>,
-    /// Vertex of the surface that a corner stands on, if it does.
-    pub(crate) vertices: Vec<Option<u32>>,
-    /// Cells whose walks met the border.
-    pub(crate) open: usize,
 }
 
 /// All cells that lie within the surface. Quads run counter-clockwise, the first side along the
 /// direction in which the first function rises.
 pub(crate) fn cells(surface: &Surface, parameters: &Parameters) -> Cells {
     let walker = Walker { surface, parameters };
-    let found: Vec<Vec<(u32, [Option<End>; 4])>> = (0..surface.triangles.len())
+    let found: Vec<Vec<[End; 4]>> = (0..surface.triangles.len())
         .into_par_iter()
         .with_min_len(64)
         .map(|f| walker.cells_of(f))
         .collect();
-    let mut out = Cells {
-        positions: Vec::new(),
-        quads: Vec::new(),
-        middles: Vec::new(),
-        vertices: Vec::new(),
-        open: 0,
-    };
+    let mut out = Cells { positions: Vec::new(), quads: Vec::new() };
     let mut numbers: HashMap<Spot, u32> = HashMap::new();
-    for (middle, ends) in found.into_iter().flatten() {
-        let [Some(a), Some(b), Some(c), Some(d)] = ends else {
-            out.open += 1;
-            continue;
-        };
-        out.quads.push([a, b, c, d].map(|end| {
+    for ends in found.into_iter().flatten() {
+        out.quads.push(ends.map(|end| {
             *numbers.entry(end.spot).or_insert_with(|| {
                 let corners = surface.corners(end.triangle as usize);
-                let point = corners.iter().zip(end.shares).map(|(p, s)| *p * s).sum();
-                out.positions.push(point);
-                out.vertices.push(match end.spot {
-                    Spot::Vertex(v) => Some(v),
-                    Spot::Inside(..) => None,
-                });
+                out.positions.push(corners.iter().zip(end.shares).map(|(p, s)| *p * s).sum());
                 out.positions.len() as u32 - 1
             })
         }));
-        out.middles.push(middle);
     }
     out
 }
@@ -87,8 +65,9 @@ struct Walker<'a> {
 }
 
 impl Walker<'_> {
-    /// The corners of all cells whose middles belong to a triangle.
-    fn cells_of(&self, f: usize) -> Vec<(u32, [Option<End>; 4])> {
+    /// The corners of all cells whose middles belong to a triangle and whose corners lie within the
+    /// surface.
+    fn cells_of(&self, f: usize) -> Vec<[End; 4]> {
         let c = self.parameters.corners[f];
         let cells = |of: fn(&Place) -> i64| {
             let values = c.each_ref().map(of);
@@ -105,7 +84,10 @@ impl Walker<'_> {
                         let to = Place { u: (i + di) * CELL, v: (j + dj) * CELL };
                         self.walk(f, middle, to)
                     };
-                    out.push((f as u32, [corner(0, 0), corner(1, 0), corner(1, 1), corner(0, 1)]));
+                    let corners = [corner(0, 0), corner(1, 0), corner(1, 1), corner(0, 1)];
+                    if let [Some(a), Some(b), Some(c), Some(d)] = corners {
+                        out.push([a, b, c, d]);
+                    }
                 }
             }
         }
@@ -160,7 +142,13 @@ impl Walker<'_> {
     }
 
     /// The other triangles at a corner.
-    fn around(&self, f: usize, corner: usize, from: Place, to: Place) -> Vec<(usize, Place, Place)> {
+    fn around(
+        &self,
+        f: usize,
+        corner: usize,
+        from: Place,
+        to: Place,
+    ) -> Vec<(usize, Place, Place)> {
         let v = self.surface.triangles[f][corner];
         let mut out: Vec<(usize, Place, Place)> = Vec::new();
         for turn in [2, 0] {

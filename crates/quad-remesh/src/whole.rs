@@ -79,11 +79,7 @@ impl Forest {
 }
 
 impl Unknowns {
-    pub(crate) fn new(
-        surface: &Surface,
-        cut: &Cut,
-        singular: &[Singular],
-    ) -> Result<Self, Error> {
+    pub(crate) fn new(surface: &Surface, cut: &Cut, singular: &[Singular]) -> Result<Self, Error> {
         let mut forest = Forest::new(cut.sheet_count);
         // Sums that must vanish; and roots twice which is a sum.
         let (mut zero, mut twice): (Vec<Whole>, Vec<(u32, Whole)>) = (Vec::new(), Vec::new());

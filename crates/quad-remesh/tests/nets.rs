@@ -10,9 +10,14 @@ fn remeshed(mesh: &SaddleMesh, edge: f64) -> Solution {
     let start = std::time::Instant::now();
     let solution = solve(&mesh.positions, &mesh.triangles, &options, &mut ()).unwrap();
     if std::env::var_os("SHOW").is_some() {
-        println!("remesh {:.2?} triangles {} {:#?}", start.elapsed(), mesh.triangles.len(), solution.metrics);
+        println!(
+            "remesh {:.2?} triangles {} {:#?}",
+            start.elapsed(),
+            mesh.triangles.len(),
+            solution.metrics
+        );
         solution.warnings.iter().for_each(|w| println!("  warning: {w}"));
-        println!("  singular {:?}", solution.singular.iter().map(|s| s.1).collect::<Vec<_>>());
+        println!("  singular {:?}", solution.singular);
     }
     solution
 }
@@ -100,12 +105,12 @@ fn enneper_of_order_two_has_a_vertex_of_valence_six() {
 
 #[test]
 fn enneper_of_order_three_has_a_vertex_of_valence_eight() {
-    on(saddle_meshes::enneper(3, 0.95, 4_000), 0.14, &[8]);
+    on(saddle_meshes::enneper(3, 0.8, 4_000), 0.14, &[8]);
 }
 
 #[test]
 fn enneper_of_order_five_has_a_vertex_of_valence_twelve() {
-    on(saddle_meshes::enneper(5, 0.95, 4_000), 0.12, &[12]);
+    on(saddle_meshes::enneper(5, 0.7, 4_000), 0.14, &[12]);
 }
 
 #[test]

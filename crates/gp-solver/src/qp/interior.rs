@@ -15,14 +15,17 @@ const FIRST_SLACK: f64 = 0.05;
 const FIRST_MULTIPLIER: f64 = 0.01;
 /// Added to the diagonal, as a share of its mean.
 const SHIFT: f64 = 1e-12;
+/// Shifts that are tried, each so many times as large as the one before.
+const SHIFTS: usize = 4;
+const SHIFT_GROWTH: f64 = 1e3;
 /// Steps before the multipliers are looked at for a proof that no point fulfils the rows.
 const STEPS_BEFORE_PROOF: usize = 5;
 
 /// Minimises `½ xᵀQ x + gᵀx`, sparse and positive semidefinite, under `a·x ≥ b` for any number of
 /// rows each of which couples few unknowns.
 ///
-/// Mehrotra's predictor and corrector (Mehrotra 1992), started at `x = 0`: formulate programs so that zero is a good
-/// guess. The normal matrix `Q + AᵀDA` is factored with one pattern throughout.
+/// Mehrotra's predictor and corrector (Mehrotra 1992), started at `x = 0`: write programs so that
+/// zero is a good guess. The normal matrix `Q + AᵀDA` is factored with one pattern throughout.
 ///
 /// # Example
 /// ```
@@ -85,7 +88,7 @@ impl<'a> InequalityQp<'a> {
     ///
     /// # Errors
     /// [`SolverError::EntryOutOfRange`] for a row the pattern has no place for,
-    /// [`SolverError::NotPositiveDefinite`].
+    /// [`SolverError::OutOfMemory`].
     pub fn solve(&self) -> Result<QpSolution, SolverError> {
         let (n, m) = (self.pattern.size(), self.bounds.len());
         let places = self.places()?;
@@ -112,8 +115,7 @@ impl<'a> InequalityQp<'a> {
                 (0..n).map(|i| quadratic[i] + self.gradient[i] - forces[i]).collect();
             let primal: Vec<f64> = (0..m).map(|r| image[r] - slack[r] - self.bounds[r]).collect();
             let gap: f64 = slack.iter().zip(&z).map(|(s, z)| s * z).sum();
-            let energy: f64 =
-                (0..n).map(|i| x[i] * (0.5 * quadratic[i] + self.gradient[i])).sum();
+            let energy: f64 = (0..n).map(|i| x[i] * (0.5 * quadratic[i] + self.gradient[i])).sum();
             let most = |list: &[f64]| list.iter().fold(0.0_f64, |most, v| most.max(v.abs()));
             let tol = self.tolerance;
             if most(&dual) <= tol * mean
@@ -133,9 +135,11 @@ impl<'a> InequalityQp<'a> {
                 }
             }
             normal.copy_from_slice(self.values);
-            (0..n).for_each(|i| normal[starts[i]] += SHIFT * mean);
             self.add_rows(&places, &slack, &z, &mut normal);
-            cholesky.factor(&normal)?;
+            if !self.factored(&mut cholesky, &mut normal, SHIFT * mean)? {
+                status = Status::Stalled;
+                break;
+            }
             let residuals = Residuals { dual: &dual, primal: &primal, slack: &slack, z: &z };
             let complement: Vec<f64> = (0..m).map(|r| slack[r] * z[r]).collect();
             self.direction(&cholesky, &residuals, &complement, &mut predicted);
@@ -167,6 +171,27 @@ impl<'a> InequalityQp<'a> {
             x,
             iterations: done,
         })
+    }
+
+    /// Factors the normal matrix with a shift, a larger one where rounding asks for it; `false` if
+    /// none helps.
+    fn factored(
+        &self,
+        cholesky: &mut SparseCholesky,
+        normal: &mut [f64],
+        shift: f64,
+    ) -> Result<bool, SolverError> {
+        let diagonals = &self.pattern.column_starts()[..self.pattern.size()];
+        let mut added = shift;
+        for _ in 0..SHIFTS {
+            diagonals.iter().for_each(|&slot| normal[slot] += added);
+            match cholesky.factor(normal) {
+                Ok(()) => return Ok(true),
+                Err(SolverError::NotPositiveDefinite { .. }) => added *= SHIFT_GROWTH,
+                Err(e) => return Err(e),
+            }
+        }
+        Ok(false)
     }
 
     fn row(&self, r: usize) -> &[(u32, f64)] {
