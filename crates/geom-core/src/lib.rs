@@ -7,6 +7,7 @@ mod bounding_box;
 mod budget;
 mod curvature_derivatives;
 mod curvature_statistics;
+mod diagonals;
 mod enclosing_ball;
 mod forms;
 mod half_edges;
@@ -29,6 +30,7 @@ pub use bounding_box::BoundingBox;
 pub use budget::{Amount, Budget, BudgetError, Cost};
 pub use curvature_derivatives::CurvatureDerivatives;
 pub use curvature_statistics::{CurvatureStatistics, ValueRange};
+pub use diagonals::{DiagonalError, diagonal_meshes};
 pub use enclosing_ball::Ball;
 pub use forms::{
     CurvatureError, FirstForm, PrincipalCurvatures, SINGULAR_RATIO, SecondForm,

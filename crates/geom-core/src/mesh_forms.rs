@@ -145,26 +145,26 @@ impl<'m> Around<'m> {
         let (mut for_points, mut for_noise) = (0, 0);
         loop {
             let near = self.within(v, radius, seen);
-            let enough = near.len() >= CUBIC_POINTS;
             let last = for_points == GROWTHS_FOR_POINTS;
-            if enough || last {
-                let fitted = self.fit(v, radius, &near);
-                let Some(found) = fitted else { return best };
-                let improves = |old: &VertexForm| found.deviation < IMPROVEMENT * old.deviation;
-                if best.as_ref().is_some_and(|old| !improves(old)) {
-                    return best;
+            let is_tried = near.len() >= CUBIC_POINTS || last;
+            match if is_tried { self.fit(v, radius, &near) } else { None } {
+                Some(found) => {
+                    let improves = |old: &VertexForm| found.deviation < IMPROVEMENT * old.deviation;
+                    if best.as_ref().is_some_and(|old| !improves(old)) {
+                        return best;
+                    }
+                    best = Some(found);
+                    let columns = [0, 1, 2].map(|k| found.tensor.col(k).length_squared());
+                    let certain =
+                        found.deviation <= NOISE * columns.into_iter().sum::<f64>().sqrt();
+                    if certain || last || for_noise == GROWTHS_FOR_NOISE {
+                        return best;
+                    }
+                    for_noise += 1;
                 }
-                best = Some(found);
-                let size = found.tensor.col(0).length_squared()
-                    + found.tensor.col(1).length_squared()
-                    + found.tensor.col(2).length_squared();
-                let certain = found.deviation <= NOISE * size.sqrt();
-                if certain || last || for_noise == GROWTHS_FOR_NOISE {
-                    return best;
-                }
-                for_noise += 1;
-            } else {
-                for_points += 1;
+                // Too few points, or all on a line.
+                None if last || best.is_some() => return best,
+                None => for_points += 1,
             }
             radius *= GROWTH;
         }

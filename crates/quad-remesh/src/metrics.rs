@@ -31,6 +31,8 @@ pub struct Metrics {
     pub unfolding_steps: usize,
     /// Triangles that the layout turns over: none, since nets with such are refused.
     pub folded_triangles: usize,
+    /// Cells within the surface that were left out since they hung on by a corner or a single side.
+    pub cells_left_out: usize,
     /// Edge length the net was made with, in model units.
     pub edge_length: f64,
     /// Mean edge length.

@@ -24,7 +24,7 @@ const NEGATIVE_SHARE: [f64; 2] = [0.60, 0.95];
 const SHORTER: f64 = 0.7;
 const TRIES: usize = 4;
 /// Rounds in which the edge length follows the number of faces, and the share by which that may be off.
-const COUNT_ROUNDS: usize = 3;
+const COUNT_ROUNDS: usize = 6;
 const COUNT_SHARE: f64 = 0.05;
 /// Weight of a triangle with curvature `R`: the share `R / median R` squared, 1 at most, and this.
 const LEAST_WEIGHT: f64 = 0.3;
@@ -100,9 +100,6 @@ pub fn solve<F: AsRef<[u32]>>(
     }
     let mesh = PolyMesh::new(made.net.positions.clone(), &made.net.quads).map_err(|_| no_cell())?;
     let metrics = made.measure(&run, &mesh, scale);
-    if made.net.dropped > 0 {
-        warnings.push(Warning::CellsLeftOut { cells: made.net.dropped });
-    }
     if let (Some(asked), used) = (options.edge_length, made.edge / scale)
         && used < 0.99 * asked
     {
@@ -212,13 +209,29 @@ impl Run<'_> {
         let mut made = self.of_length(directions, edge)?;
         let Some(wanted) = wanted else { return Ok(made) };
         let wanted = wanted as f64;
-        let off = |made: &Made| (made.net.quads.len() as f64 - wanted).abs();
+        let count = |made: &Made| made.net.quads.len() as f64;
+        let off = |made: &Made| (count(made) - wanted).abs();
+        // Edges known to give too few faces, and too many.
+        let (mut long, mut short) = (f64::INFINITY, 0.0_f64);
+        let mut last = count(&made);
         for _ in 0..COUNT_ROUNDS {
-            if off(&made) <= COUNT_SHARE * wanted || made.net.quads.is_empty() {
+            if off(&made) <= COUNT_SHARE * wanted || last == 0.0 {
                 break;
             }
-            edge *= (made.net.quads.len() as f64 / wanted).sqrt();
-            let next = self.of_length(directions, edge)?;
+            if last < wanted {
+                long = long.min(edge);
+            } else {
+                short = short.max(edge);
+            }
+            edge *= (last / wanted).sqrt();
+            if edge >= long || edge <= short {
+                edge = (long * short).sqrt();
+            }
+            let next = match self.of_length(directions, edge) {
+                Err(Error::Folds { .. }) => break,
+                other => other?,
+            };
+            last = count(&next);
             if off(&next) < off(&made) {
                 made = next;
             }
@@ -323,11 +336,12 @@ impl Made {
             euler_characteristic: mesh.euler_characteristic(),
             surface_euler_characteristic: surface.euler_characteristic(),
             singular_points: self.singular.len(),
-            index_sum: self.singular.iter().map(|s| 0.5 * f64::from(s.twice_index)).sum(),
+            index_sum: 0.5 * f64::from(self.singular.iter().map(|s| s.twice_index).sum::<i32>()),
             whole_numbers: self.wholes,
             whole_number_cuts: self.cuts,
             unfolding_steps: self.steps,
             folded_triangles: 0,
+            cells_left_out: self.net.dropped,
             edge_length: self.edge / scale,
             edge_length_mean: mean / scale,
             edge_ratio_min: low / self.edge,

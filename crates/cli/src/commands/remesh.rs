@@ -15,7 +15,7 @@ use std::path::PathBuf;
 /// Arguments of `remesh`.
 #[derive(Debug, clap::Args)]
 #[command(
-    after_help = "Example: umbilic remesh fixtures/nets/tower.obj -o quads.obj --faces 300 && umbilic hnet quads.obj -o skin.step --reference fixtures/nets/tower.obj\n\nGuide: docs/guide/nets.md"
+    after_help = "Example: umbilic remesh fixtures/triangles/tower.obj -o quads.obj --faces 300 && umbilic hnet quads.obj -o skin.step --reference fixtures/triangles/tower.obj\n\nGuide: docs/guide/nets.md"
 )]
 pub(crate) struct Remesh {
     /// Triangles or polygons of a negatively curved surface
