@@ -59,7 +59,7 @@ pub fn diagonal_meshes(mesh: &PolyMesh) -> Result<[PolyMesh; 2], DiagonalError> 
             if !is_face {
                 continue;
             }
-            let corners: Vec<u32> = mesh
+            let mut corners: Vec<u32> = mesh
                 .ring(v)
                 .map(|w| {
                     let number = &mut numbers[w.index()];
@@ -70,6 +70,8 @@ pub fn diagonal_meshes(mesh: &PolyMesh) -> Result<[PolyMesh; 2], DiagonalError> 
                     *number
                 })
                 .collect();
+            // A walk around a vertex runs clockwise.
+            corners.reverse();
             faces.push(corners);
         }
         PolyMesh::new(positions, &faces)

@@ -20,6 +20,9 @@ const GROWTHS_FOR_NOISE: usize = 3;
 /// without a look farther away; and by what factor that look must improve it.
 const NOISE: f64 = 0.06;
 const IMPROVEMENT: f64 = 0.75;
+/// Fits that magnify an error of the heights by more, columns made of length one, tell nothing: three
+/// rows of points cannot tell `x³` from `x²` and `x`.
+const MOST_GAIN: f64 = 60.0;
 /// Points farther than this share of the radius weigh less than `e^(-1/2)`.
 const SPREAD: f64 = 0.6;
 /// Points at most; of more, every second, third or further one counts.
@@ -198,6 +201,10 @@ impl<'m> Around<'m> {
             heights.push(weight * z);
         }
         least_squares(&mut matrix, terms, &mut heights, 1).ok()?;
+        let (deviation, gain) = magnification(&matrix, terms);
+        if gain > MOST_GAIN {
+            return None;
+        }
         let left: f64 = heights[terms..].iter().map(|r| r * r).sum();
         let spare = (near.len() - terms).max(1) as f64;
         let noise = (left / spare).sqrt();
@@ -216,13 +223,14 @@ impl<'m> Around<'m> {
         let tensor = outer(dual_x, dual_x) * l
             + (outer(dual_x, dual_y) + outer(dual_y, dual_x)) * m
             + outer(dual_y, dual_y) * n;
-        let deviation = noise * magnification(&matrix, terms) / radius;
+        let deviation = noise * deviation / radius;
         Some(VertexForm { normal: fitted, tensor, deviation, radius })
     }
 }
 
-/// Largest norm of the curvature terms' rows of the inverse of an upper triangle.
-fn magnification(triangle: &[f64], terms: usize) -> f64 {
+/// How much the curvature terms magnify an error of the heights: the largest norm of their rows of
+/// the inverse of an upper triangle, as it is and with the columns made of length one.
+fn magnification(triangle: &[f64], terms: usize) -> (f64, f64) {
     let curvature = 3..6;
     let mut norms = [0.0; 6];
     let mut column = [0.0; CUBIC];
@@ -235,7 +243,13 @@ fn magnification(triangle: &[f64], terms: usize) -> f64 {
             norms[i] += column[i] * column[i];
         }
     }
-    norms.iter().fold(0.0_f64, |largest, n| largest.max(*n)).sqrt()
+    let (mut plain, mut scaled) = (0.0_f64, 0.0_f64);
+    for i in curvature {
+        let length: f64 = (0..=i).map(|k| triangle[k * terms + i].powi(2)).sum();
+        plain = plain.max(norms[i].sqrt());
+        scaled = scaled.max((norms[i] * length).sqrt());
+    }
+    (plain, scaled)
 }
 
 #[cfg(test)]

@@ -70,7 +70,7 @@ pub(crate) fn repair<F: AsRef<[u32]>>(points: &[DVec3], faces: &[F]) -> Result<R
     if count > 0 {
         warnings.push(Warning::Turned { faces: count });
     }
-    let (triangles, sources, split) = split_vertices(&triangles)?;
+    let Fans { triangles, sources, split } = split_vertices(&triangles)?;
     if split > 0 {
         warnings.push(Warning::Split { vertices: split });
     }
@@ -130,9 +130,18 @@ fn drop_repeated(triangles: &mut Vec<[u32; 3]>) -> usize {
     before - triangles.len()
 }
 
+/// Triangles whose every vertex has one fan.
+struct Fans {
+    triangles: Vec<[u32; 3]>,
+    /// Of which vertex each new one is a copy.
+    sources: Vec<u32>,
+    /// How many copies there are.
+    split: usize,
+}
+
 /// Gives every fan of triangles a vertex of its own: triangles are neighbours across edges of exactly
-/// two that run along it in opposite directions. Also returns of which vertex each new one is a copy.
-fn split_vertices(triangles: &[[u32; 3]]) -> Result<(Vec<[u32; 3]>, Vec<u32>, usize), Error> {
+/// two that run along it in opposite directions.
+fn split_vertices(triangles: &[[u32; 3]]) -> Result<Fans, Error> {
     let mut sides: BTreeMap<(u32, u32), Vec<u32>> = BTreeMap::new();
     for (f, t) in triangles.iter().enumerate() {
         for k in 0..3 {
@@ -174,7 +183,7 @@ fn split_vertices(triangles: &[[u32; 3]]) -> Result<(Vec<[u32; 3]>, Vec<u32>, us
     }
     let distinct: std::collections::HashSet<u32> = sources.iter().copied().collect();
     let split = sources.len() - distinct.len();
-    Ok((out, sources, split))
+    Ok(Fans { triangles: out, sources, split })
 }
 
 /// The edge-connected part with the largest area, its vertices numbered anew, and the number of parts.

@@ -26,7 +26,7 @@ fn remeshed((points, faces): &Mesh) -> Result<Solution, Error> {
 
 /// The net of the sound saddle.
 fn sound() -> Solution {
-    remeshed(&saddle(24)).unwrap()
+    remeshed(&saddle(24)).expect("a net")
 }
 
 fn is_as_sound(solution: &Solution) {

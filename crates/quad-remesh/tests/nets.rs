@@ -7,19 +7,7 @@ use quad_remesh::{Options, Solution, Status, solve};
 
 fn remeshed(mesh: &SaddleMesh, edge: f64) -> Solution {
     let options = Options { edge_length: Some(edge), ..Options::default() };
-    let start = std::time::Instant::now();
-    let solution = solve(&mesh.positions, &mesh.triangles, &options, &mut ()).unwrap();
-    if std::env::var_os("SHOW").is_some() {
-        println!(
-            "remesh {:.2?} triangles {} {:#?}",
-            start.elapsed(),
-            mesh.triangles.len(),
-            solution.metrics
-        );
-        solution.warnings.iter().for_each(|w| println!("  warning: {w}"));
-        println!("  singular {:?}", solution.singular);
-    }
-    solution
+    solve(&mesh.positions, &mesh.triangles, &options, &mut ()).expect("a net")
 }
 
 /// What is asked of a net and of the hyperbolic net it becomes.
@@ -41,24 +29,12 @@ fn check(mesh: &SaddleMesh, clean: &SaddleMesh, edge: f64, singular: &[usize], b
     let inner = net.vertices().filter(|&v| !net.is_boundary_vertex(v));
     let mut valences: Vec<usize> = inner.map(|v| net.valence(v)).filter(|n| *n != 4).collect();
     valences.sort_unstable();
-    let reference = TriMesh::new(clean.positions.clone(), clean.triangles.clone()).unwrap();
-    let quads = QuadNet::new(net).unwrap();
+    let reference = TriMesh::new(clean.positions.clone(), clean.triangles.clone()).expect("sound");
+    let quads = QuadNet::new(net).expect("two families");
     let input = Input::near_mesh(&quads, &reference);
     let hnet = hyperbolic_nets::solve(&input, &hyperbolic_nets::Options::default(), &mut ());
-    let hnet = hnet.unwrap();
+    let hnet = hnet.expect("near asymptotic");
     let m = &hnet.metrics;
-    if std::env::var_os("SHOW").is_some() {
-        println!(
-            "  valences {valences:?} kink {:.1e} folds {} W {:.3}..{:.3} misaligned {:.2} distance {:.3}/{:.4}",
-            m.kink_max_deg,
-            m.folds,
-            m.shape_parameter_min,
-            m.shape_parameter_max,
-            hnet.gates.misalignment.to_degrees(),
-            m.deviation_max_edges,
-            m.deviation_mean_percent / m.deviation_max_percent * m.deviation_max_edges,
-        );
-    }
     let [most, mean] = bounds.distance;
     assert_eq!(valences, singular);
     assert_eq!(solution.status, Status::Converged);
@@ -76,9 +52,6 @@ fn check(mesh: &SaddleMesh, clean: &SaddleMesh, edge: f64, singular: &[usize], b
         .map(|[a, b, c]| 0.5 * (b - a).cross(c - a).length())
         .sum();
     let least = 1.0 - 0.75 * edge * border(&solution.surface) / area;
-    if std::env::var_os("SHOW").is_some() {
-        println!("  covered {:.3} of {least:.3}", r.covered_share);
-    }
     assert!(r.covered_share >= least, "{} {least}", r.covered_share);
 }
 
@@ -147,7 +120,7 @@ fn tower() {
 
 /// The net of a mesh with this many threads, as bytes.
 fn bytes(mesh: &SaddleMesh, edge: f64, threads: usize) -> Vec<u8> {
-    let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("threads");
     let solution = pool.install(|| remeshed(mesh, edge));
     let numbers = solution.result.positions().iter().flat_map(|p| p.to_array());
     let mut bytes: Vec<u8> = numbers.flat_map(f64::to_le_bytes).collect();

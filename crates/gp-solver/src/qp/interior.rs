@@ -5,6 +5,8 @@ use crate::error::SolverError;
 use crate::linear::{SparseCholesky, SymmetricPattern};
 use crate::report::Status;
 
+/// Largest sum of slacks times multipliers at the end, as a share of the energy.
+const GAP: f64 = 1e-12;
 /// Steps at most.
 const MOST_STEPS: usize = 80;
 /// Share of the way to the nearest bound a step goes.
@@ -120,7 +122,7 @@ impl<'a> InequalityQp<'a> {
             let tol = self.tolerance;
             if most(&dual) <= tol * mean
                 && most(&primal) <= tol * largest.max(1.0)
-                && gap <= tol * energy.abs().max(mean)
+                && gap <= GAP * energy.abs().max(mean)
             {
                 status = Status::Converged;
                 break;

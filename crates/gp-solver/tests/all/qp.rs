@@ -273,7 +273,7 @@ fn sparse_programs_with_inequalities_have_the_same_minimum_or_none() {
             for _ in 0..3 {
                 row[(random.next().abs() * n as f64) as usize % n] = random.next();
             }
-            program.least.push((row, random.next() - 0.7));
+            program.least.push((row, random.next() - 0.4));
         }
         let all: Vec<u32> = (0..n as u32).collect();
         let pattern = SymmetricPattern::from_cliques(n, [all].iter());
