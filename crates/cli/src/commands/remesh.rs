@@ -10,6 +10,7 @@ use crate::report_support::{self, mesh::mesh_view};
 use crate::watch::Watch;
 use exchange::{Mesh, Model};
 use quad_remesh::{Options, Solution, solve};
+use report::{LineRole, LineSet};
 use std::path::PathBuf;
 
 /// Arguments of `remesh`.
@@ -66,7 +67,13 @@ impl Remesh {
             let mut page = report_support::new("Asymptotic net");
             page.length_unit = model.unit.to_string();
             option_flags::list(&mut page, &options, &[]);
-            page.stages.push(mesh_view("net", &quads, &page.length_unit)?);
+            let net = &solution.result;
+            let end = |v| net.position(v);
+            let edges = net.edges().map(|h| vec![end(net.origin(h)), end(net.target(h))]).collect();
+            let mut lines = LineSet::new("edges", "edges of the net", LineRole::Curves, edges);
+            lines.visible = true;
+            let view = mesh_view("net", &quads, &page.length_unit)?;
+            page.stages.push(view.with_lines(lines).map_err(Failure::other)?);
             let surface = Mesh::from_poly_mesh(&solution.surface);
             page.stages.push(mesh_view("surface", &surface, &page.length_unit)?);
             report_support::add_files(&mut outcome, &self.report, context, page)?;
