@@ -105,7 +105,7 @@ pub use observer::{Observer, Progress};
 pub use options::{Method, Options, Regularization};
 pub use problem::{BlockId, Problem};
 #[cfg(feature = "sparse")]
-pub use qp::{BoundedQp, SparseQp};
+pub use qp::{BoundedQp, Eliminated, InequalityQp, LatticeQp, MixedQp, SparseQp};
 pub use qp::{DenseQp, LinearEquation, QpSolution, QuadraticForm, QuadraticTerm};
 pub use quadratic::{Equation, QuadraticBuilder, QuadraticConstraints};
 pub use report::{IterationRecord, Report, Status, Term, Timings};

@@ -15,6 +15,7 @@ mod fair;
 mod fit;
 mod hnet;
 mod panel;
+mod remesh;
 mod verify;
 mod weingarten;
 
@@ -69,6 +70,8 @@ commands! {
     weingarten::Weingarten,
     /// Recompute what a run claims from the files it wrote
     verify::Verify,
+    /// Make quads along the asymptotic lines of any negatively curved surface
+    remesh::Remesh,
     /// Turn quads along asymptotic directions into a smooth skin of ruled patches
     hnet::Hnet,
 }

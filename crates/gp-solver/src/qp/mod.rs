@@ -1,9 +1,16 @@
-//! Convex quadratic programs: dense with any constraints, sparse with bounds, sparse with equalities.
+//! Convex quadratic programs: dense with any constraints, sparse with bounds, with equalities, with
+//! inequalities, and with some unknowns that are whole numbers.
 
 #[cfg(feature = "sparse")]
 mod bounded;
 mod dense;
 mod form;
+#[cfg(feature = "sparse")]
+mod interior;
+#[cfg(feature = "sparse")]
+mod lattice;
+#[cfg(feature = "sparse")]
+mod mixed;
 #[cfg(feature = "sparse")]
 mod sparse;
 
@@ -11,6 +18,12 @@ mod sparse;
 pub use bounded::BoundedQp;
 pub use dense::DenseQp;
 pub use form::{LinearEquation, QuadraticForm, QuadraticTerm};
+#[cfg(feature = "sparse")]
+pub use interior::InequalityQp;
+#[cfg(feature = "sparse")]
+pub use lattice::LatticeQp;
+#[cfg(feature = "sparse")]
+pub use mixed::{Eliminated, MixedQp};
 #[cfg(feature = "sparse")]
 pub use sparse::SparseQp;
 

@@ -6,7 +6,10 @@ use clarabel::solver::{
     DefaultSettings, DefaultSolver, IPSolver, NonnegativeConeT, SolverStatus, SupportedConeT,
     ZeroConeT,
 };
-use gp_solver::{BoundedQp, DenseQp, LinearEquation, QuadraticTerm, SparseQp, Status};
+use gp_solver::{
+    BoundedQp, DenseQp, InequalityQp, LinearEquation, MixedQp, QuadraticTerm, SparseQp, Status,
+    SymmetricPattern,
+};
 
 /// Reproducible numbers in −1..1.
 struct Random(u64);
@@ -254,5 +257,93 @@ fn wishes_that_can_be_had_are_had() {
         }
         let theirs = program.by_interior_points();
         agrees(&qp.solve().expect("convex"), theirs, &format!("seed {seed}"));
+    }
+}
+
+#[test]
+fn sparse_programs_with_inequalities_have_the_same_minimum_or_none() {
+    let mut infeasible = 0;
+    for seed in 300..360 {
+        let random = &mut Random(seed);
+        let n = 3 + seed as usize % 9;
+        let mut program = Program::random(random, n);
+        for _ in 0..3 * n {
+            // Rows of three unknowns.
+            let mut row = vec![0.0; n];
+            for _ in 0..3 {
+                row[(random.next().abs() * n as f64) as usize % n] = random.next();
+            }
+            program.least.push((row, random.next() - 0.4));
+        }
+        let all: Vec<u32> = (0..n as u32).collect();
+        let pattern = SymmetricPattern::from_cliques(n, [all].iter());
+        let lower = (0..n).flat_map(|j| (j..n).map(move |i| (i, j)));
+        let values: Vec<f64> = lower.map(|(i, j)| program.hessian[i][j]).collect();
+        let mut qp = InequalityQp::new(&pattern, &values, &program.linear);
+        for (row, bound) in &program.least {
+            let entries: Vec<(usize, f64)> =
+                row.iter().copied().enumerate().filter(|(_, a)| *a != 0.0).collect();
+            qp.at_least(&entries, *bound);
+        }
+        let theirs = program.by_interior_points();
+        infeasible += usize::from(theirs.is_none());
+        let ours = qp.solve().expect("convex");
+        if theirs.is_none() {
+            // The multipliers prove it.
+            let z = &ours.multipliers;
+            let bound: f64 = program.least.iter().zip(z).map(|((_, b), z)| b * z).sum();
+            let pull = |i: usize| program.least.iter().zip(z).map(|((a, _), z)| a[i] * z).sum();
+            let pull: f64 = (0..n).map(pull).map(f64::abs).sum();
+            assert!(bound > 1e3 * pull && z.iter().all(|z| *z >= 0.0), "{bound} {pull}");
+        }
+        agrees(&ours, theirs, &format!("seed {seed}"));
+    }
+    assert!((5..55).contains(&infeasible), "{infeasible} of 60 programs are infeasible");
+}
+
+#[test]
+fn real_unknowns_follow_the_whole_ones() {
+    // Chains of differences with targets, and a step by a whole number in the middle.
+    for seed in 400..420 {
+        let random = &mut Random(seed);
+        let n = 8;
+        let groups: Vec<[u32; 2]> = (0..n as u32 - 1).map(|i| [i, i + 1]).collect();
+        let mut mixed = MixedQp::new(n, 2, groups.iter()).expect("a pattern");
+        let mut squares = Vec::new();
+        for i in 0..n - 1 {
+            let mut row = vec![(i, -1.0), (i + 1, 1.0)];
+            if i == 3 {
+                row.extend([(n, 1.0), (n + 1, -2.0)]);
+            }
+            squares.push((row, 2.0 * random.next(), 1.0 + random.next().abs()));
+        }
+        squares.push((vec![(7, 1.0), (n + 1, 0.5)], 3.0 * random.next(), 0.7));
+        squares.push((vec![(2, 1.0), (n, 0.3)], 3.0 * random.next(), 0.5));
+        squares.iter().for_each(|(row, t, w)| mixed.square(row, *t, *w));
+        let eliminated = mixed.eliminate(Some(0)).expect("determined");
+        let energy = |x: &[f64], k: &[f64]| -> f64 {
+            let value = |i: usize| if i < n { x[i] } else { k[i - n] };
+            let term = |(row, t, w): &(Vec<(usize, f64)>, f64, f64)| {
+                let at: f64 = row.iter().map(|(i, a)| a * value(*i)).sum();
+                0.5 * w * (at - t).powi(2)
+            };
+            squares.iter().map(term).sum()
+        };
+        let k = eliminated.lattice().minimize();
+        let x = eliminated.reals(&k);
+        assert!(x[0].abs() < 1e-12 && k.iter().all(|k| k.fract() == 0.0));
+        let best = energy(&x, &k);
+        // No real unknown and no pair of whole ones does better.
+        for i in 1..n {
+            for step in [1e-4, -1e-4] {
+                let mut y = x.clone();
+                y[i] += step;
+                assert!(energy(&y, &k) > best);
+            }
+        }
+        for (a, b) in (-3..=3).flat_map(|a| (-3..=3).map(move |b| (a, b))) {
+            let other = [k[0] + f64::from(a), k[1] + f64::from(b)];
+            assert!(energy(&eliminated.reals(&other), &other) > best - 1e-9);
+        }
     }
 }
