@@ -41,6 +41,7 @@ mod mold;
 mod panel;
 mod quadrature;
 mod recompute;
+mod remesh;
 mod shape;
 mod spline;
 mod table;

@@ -3,7 +3,7 @@
 use crate::claims::{Claims, Finding, Values};
 use crate::content::Content;
 use crate::table::{Scale, row_of};
-use crate::{analyze, asymptotic, convert, darboux, fair, fit, hnet, panel, weingarten};
+use crate::{analyze, asymptotic, convert, darboux, fair, fit, hnet, panel, remesh, weingarten};
 use glam::DVec3;
 use serde_json::Value;
 
@@ -78,6 +78,11 @@ fn recompute(
         }
         "panel" => panel::recompute(file, input_surface, &mut values),
         "hnet" => hnet::recompute(file, &mut values),
+        "remesh" => {
+            if let Some(mesh) = file.mesh() {
+                remesh::recompute(mesh, claims, &mut values);
+            }
+        }
         "darboux" => {
             if let Some(mesh) = file.mesh() {
                 darboux::recompute(mesh, claims, &mut values);

@@ -262,6 +262,30 @@ pub const TABLE: &[Row] = &[
         only(Accuracy::new(0.0, 1e-12, 1)),
     ),
     row(
+        "remesh",
+        &[
+            "faces",
+            "vertices",
+            "irregular_vertices",
+            "odd_valence_vertices",
+            "euler_characteristic",
+        ],
+        "the quads (OBJ, PLY, OFF)",
+        COUNT,
+    ),
+    row(
+        "remesh",
+        &["edge_length_mean"],
+        "the quads (OBJ, PLY, OFF)",
+        only(Accuracy::new(1e-12, 1e-14, 1)),
+    ),
+    row(
+        "remesh",
+        &["edge_ratio_min", "edge_ratio_max", "angle_min_deg"],
+        "the quads (OBJ, PLY, OFF)",
+        only(Accuracy::new(1e-9, 1e-12, 0)),
+    ),
+    row(
         "convert",
         &["surfaces", "control_points", "vertices", "faces"],
         "the output, if it has surfaces where the input has them, and meshes else; not STL and GLB",

@@ -112,6 +112,12 @@ fn far_from_the_origin_and_in_rhino() {
 }
 
 #[test]
+fn remesh() {
+    let args = ["remesh", "fixtures/triangles/bumped-ring.obj", "--faces", "200"];
+    Run::of(&args, "a.obj").check("a.obj", 8, |text| moved(text, "\nv ", 20, 4e-6));
+}
+
+#[test]
 fn what_was_chosen_of_a_file_is_what_claims_are_about() {
     let bracket = "fixtures/step/bracket.step";
     let (code, text) = Run::of(&["analyze", bracket, "--surface", "2"], "").verified(&[]);
