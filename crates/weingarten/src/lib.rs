@@ -25,7 +25,9 @@
 //! # Ok::<(), weingarten::Error>(())
 //! ```
 
+mod area;
 mod axis;
+mod best;
 pub mod blocks;
 mod curve;
 mod error;
@@ -33,10 +35,13 @@ mod field;
 mod grid;
 mod input;
 mod kernel;
+mod kind;
 mod level;
 mod lifted;
 mod locus;
 mod metrics;
+mod miss;
+mod nested;
 mod options;
 mod prepare;
 mod rational;
@@ -44,6 +49,7 @@ mod relation;
 mod sampled;
 mod schedule;
 mod solve;
+mod stall;
 mod sweep;
 mod target;
 mod tensor;
@@ -56,6 +62,7 @@ pub use gp_solver::Status;
 pub use input::Input;
 pub use locus::RelationLocus;
 pub use metrics::Metrics;
+pub use miss::RelationMiss;
 pub use options::{Border, Formulation, Move, Options};
 pub use relation::Relation;
 pub use solve::{Solution, problem, solve, solve_with};

@@ -46,7 +46,7 @@ fn first_steps_equal_the_recorded_ones() {
         let q0 = crate::blocks::residual_scale(&start.samples, level.curvature);
         assert_close(q0 / scene.first_step.q0, 1.0, 1e-10);
         for factorization in [Factorization::Auto, Factorization::Sparse] {
-            let problem = level.problem(&options, &start).unwrap();
+            let problem = level.problem(&options, &start, &x).unwrap();
             let mut system = System::new(problem, factorization).unwrap();
             system.refresh(&x);
             let energy = system.linearize(&x).unwrap();
