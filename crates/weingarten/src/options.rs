@@ -42,7 +42,8 @@ choices!(Formulation { Reduced = "reduced", Lifted = "lifted" });
 /// assert_eq!(Border::read("soft=30"), Ok(Border::Soft(30.0)));
 /// assert_eq!(Border::default(), Border::Free);
 /// ```
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
 pub enum Border {
     /// It moves like the rest.
     #[default]
@@ -78,8 +79,6 @@ impl OptionValue for Border {
         })
     }
 }
-
-serde_as_text!(Border);
 
 /// A control point of the input to move before optimising: the moved surface is the reference.
 ///

@@ -9,6 +9,7 @@ use gp_solver::{
 };
 
 use crate::best::{Best, Judge};
+use crate::corners::{HeldCorner, held_corners};
 use crate::error::Error;
 use crate::input::Input;
 use crate::level::Level;
@@ -56,6 +57,8 @@ pub struct Solution {
     pub relation: Option<RelationLocus>,
     /// How far the result is from the relation asked for, and where most.
     pub miss: Option<RelationMiss>,
+    /// Corners that keep a mean curvature asked for from being reached while the border is held.
+    pub held_corners: Vec<HeldCorner>,
     /// What the solver did: a stage per level, named after its net.
     pub report: RunReport,
     /// Samples in u and v of the last level.
@@ -219,15 +222,21 @@ pub fn solve_with<'a>(
         let what = "a run with more levels".to_owned();
         return Err(gp_solver::SolverError::ForeignCheckpoint { what }.into());
     };
-    let mut report = RunReport { iterations: steps, ..RunReport::of_stages(stages) };
-    if has_gone_astray && report.status == Status::IterationLimit {
-        report.status = Status::Stalled;
-    }
+    let report = RunReport { iterations: steps, ..RunReport::of_stages(stages) };
     // A net nothing has moved is the input itself, to the last bit.
     let is_input = steps == 0 && options.levels.is_empty() && options.moves.is_empty();
     let working = if is_input { None } else { Some(&working) };
-    let finished =
-        finish(input, place.size(), schedule.target(), &level, working, earlier, report)?;
+    let finished = finish(
+        input,
+        place.size(),
+        options,
+        schedule.target(),
+        &level,
+        working,
+        earlier,
+        has_gone_astray,
+        report,
+    )?;
     let result =
         if is_input { given.surface.clone() } else { finished.result.translated(place.center()) };
     Ok(Solution { result, ..finished })
@@ -264,10 +273,12 @@ pub fn problem<'a>(
 fn finish(
     input: Input<'_>,
     size: f64,
+    options: &Options,
     target: Option<&Target>,
     level: &Level,
     working: Option<&BsplineSurface>,
     earlier: Option<(usize, Vec<f64>)>,
+    has_gone_astray: bool,
     mut report: RunReport,
 ) -> Result<Solution, Error> {
     let result = match working {
@@ -289,9 +300,14 @@ fn finish(
         None => None,
     };
     let miss = target.map(|target| meter.miss(&result, target));
-    report.status = verdict(report.status, !flaws.is_empty(), miss.as_ref());
+    report.status = verdict(report.status, !flaws.is_empty(), has_gone_astray, miss.as_ref());
+    let unit = level.stage.unit;
+    let held_corners = target
+        .map(|target| held_corners(input.surface, options.border, target, unit))
+        .unwrap_or_default();
     Ok(Solution {
         miss,
+        held_corners,
         before: meter.measure(input.surface, target),
         metrics: meter.measure(&result, target),
         relation: target.map(|target| meter.locus(&result, target)),
@@ -307,11 +323,19 @@ fn finish(
 
 /// The status of a run that ended with `ended`: torn results are none, and where the relation asked for
 /// does not hold, the best surface near to the input has been found and not the one wanted.
-fn verdict(ended: Status, is_torn: bool, miss: Option<&RelationMiss>) -> Status {
+fn verdict(
+    ended: Status,
+    is_torn: bool,
+    has_gone_astray: bool,
+    miss: Option<&RelationMiss>,
+) -> Status {
+    let is_missed = miss.is_some_and(|miss| !miss.is_held());
     match ended {
         Status::Interrupted => ended,
         _ if is_torn => Status::Failed,
-        Status::Converged if miss.is_some_and(|miss| !miss.is_held()) => Status::Stalled,
+        Status::Converged if is_missed => Status::Stalled,
+        // The last steps only led away.
+        Status::IterationLimit if is_missed && has_gone_astray => Status::Stalled,
         _ => ended,
     }
 }

@@ -87,6 +87,11 @@ impl Target {
         Some(Self { now: wanted.clone(), wanted, unit, units })
     }
 
+    /// What is asked for in the end.
+    pub(crate) fn wanted(&self) -> &Kind {
+        &self.wanted
+    }
+
     /// The relation of the same kind nearest to `samples`, where a way to this one begins, and how
     /// far it is; `None` for what is fitted anyway.
     pub(crate) fn regressed(&self, samples: &[Sample]) -> Option<(Regressed, f64)> {
