@@ -19,6 +19,8 @@ pub(crate) struct Judge {
     /// Whether where the stage begins counts.
     with_start: bool,
     best: Option<Best>,
+    /// The iterate seen last.
+    seen: usize,
 }
 
 /// An iterate and its measure.
@@ -36,6 +38,7 @@ impl Judge {
             target: level.target().map(Target::for_now),
             with_start: level.target().is_some(),
             best,
+            seen: 0,
         };
         // No relation is worth a surface that is farther from it than the input.
         if judge.with_start {
@@ -50,6 +53,7 @@ impl Judge {
         if !is_due && !is_last {
             return;
         }
+        self.seen = iteration;
         let here = samples(&self.grid, x);
         let value = match &self.target {
             Some(target) => target.rms(&here, None),
@@ -68,7 +72,9 @@ impl Judge {
 
     /// The best iterate after the `last` one has been seen too; `None` if that is the best.
     pub(crate) fn other_than(mut self, iteration: usize, last: &[f64]) -> Option<Vec<f64>> {
-        self.see(iteration, true, last);
+        if self.seen != iteration {
+            self.see(iteration, true, last);
+        }
         self.best.map(|best| best.x).filter(|x| x != last)
     }
 }

@@ -207,12 +207,12 @@ pub fn solve_with<'a>(
         }
         earlier = watch.earlier.filter(|_| status == Status::IterationLimit);
         steps += run.iterations();
+        stages.push(StageReport { stage: level.stage.clone(), solver: run.report(status) });
         let last = &run.x()[..level.unknowns()];
         let judge = watch.judge.filter(|_| status != Status::Interrupted);
         let better = judge.and_then(|judge| judge.other_than(run.iterations(), last));
         has_gone_astray = better.is_some() && level.target().is_some();
         let working = level.surface(better.as_deref().unwrap_or(last))?;
-        stages.push(StageReport { stage: level.stage.clone(), solver: run.report(status) });
         done = Some((level, working));
         if status == Status::Interrupted {
             break;
