@@ -4,11 +4,16 @@ use crate::field::samples;
 use crate::grid::SampleGrid;
 use crate::level::Level;
 use crate::metrics::alignment_rms;
+use crate::stall::HELD;
 use crate::target::Target;
 use crate::variables::coordinates;
 
 /// Iterates are judged this many steps apart, and at the end.
 const EVERY: usize = 5;
+/// A stage has stalled if none of so many steps has brought a better iterate.
+const PATIENCE: usize = 40;
+/// By how much better an iterate must be to count as progress.
+const PROGRESS: f64 = 1e-3;
 
 /// What judges the iterates of a stage: the midpoints of the cells of a grid twice as dense as the samples,
 /// those of [`crate::Metrics`]. Where the energy falls on the samples and the surface grows worse
@@ -21,6 +26,8 @@ pub(crate) struct Judge {
     best: Option<Best>,
     /// The iterate seen last.
     seen: usize,
+    /// Below this measure there is nothing left to gain.
+    held: f64,
 }
 
 /// An iterate and its measure.
@@ -28,6 +35,8 @@ pub(crate) struct Judge {
 pub(crate) struct Best {
     pub(crate) value: f64,
     pub(crate) x: Vec<f64>,
+    /// When an iterate was last better by more than rounding, and its measure.
+    pub(crate) progress: (usize, f64),
 }
 
 impl Judge {
@@ -39,6 +48,7 @@ impl Judge {
             with_start: level.target().is_some(),
             best,
             seen: 0,
+            held: HELD * level.target().map_or(1.0, Target::natural),
         };
         // No relation is worth a surface that is farther from it than the input.
         if judge.with_start {
@@ -61,8 +71,20 @@ impl Judge {
         };
         // NaN is never better.
         if self.best.as_ref().is_none_or(|best| value < best.value) && value.is_finite() {
-            self.best = Some(Best { value, x: x.to_vec() });
+            let before = self.best.as_ref().map(|best| best.progress);
+            let progress = match before {
+                Some((_, old)) if value < (1.0 - PROGRESS) * old => (iteration, value),
+                Some(before) => before,
+                None => (iteration, value),
+            };
+            self.best = Some(Best { value, x: x.to_vec(), progress });
         }
+    }
+
+    /// Whether the steps up to this one have long brought nothing, and there is something to gain.
+    pub(crate) fn has_stalled(&self, iteration: usize) -> bool {
+        let stuck = |best: &Best| best.value > self.held && iteration >= best.progress.0 + PATIENCE;
+        self.best.as_ref().is_some_and(stuck)
     }
 
     /// The best iterate so far.

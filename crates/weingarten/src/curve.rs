@@ -4,7 +4,7 @@ use bspline::{Degree, KnotVector};
 use numerics::lu_solve;
 
 /// Control points of a fitted curve.
-const CONTROL: usize = 8;
+pub(crate) const CONTROL: usize = 8;
 /// Rounds of foot points and refits.
 const ROUNDS: usize = 6;
 /// Weight of the second differences of the control points against the mean square distance: only
@@ -39,11 +39,6 @@ impl DiagramCurve {
         Some(Self { knots, control })
     }
 
-    /// A curve of eight control points near `points`.
-    pub(crate) fn fit_to(points: &[[f64; 2]]) -> Option<Self> {
-        Self::fit(points, CONTROL)
-    }
-
     /// A curve of `control` points near `points`. Parameters come from the principal axis of the
     /// cloud or from the order along it, whichever leads to the nearer curve, and then from foot
     /// points.
@@ -51,22 +46,34 @@ impl DiagramCurve {
         let orders = [along_axis(points), along_cloud(points)];
         let fits = orders.into_iter().flatten().filter_map(|order| {
             let curve = Self::fit_from(points, control, order)?;
-            let square = |(p, foot): (&[f64; 2], Foot)| {
-                (p[0] - foot.point[0]).powi(2) + (p[1] - foot.point[1]).powi(2)
-            };
+            let square = |(p, foot): (&[f64; 2], Foot)| apart(*p, foot.point).powi(2);
             let miss: f64 = points.iter().zip(curve.feet(points)).map(square).sum();
             Some((miss, curve))
         });
         fits.min_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, curve)| curve)
     }
 
+    /// Root mean square distance of `points` from the curve of so many control points fitted to them.
+    pub(crate) fn thickness(points: &[[f64; 2]], control: usize) -> f64 {
+        let Some(curve) = Self::fit(points, control) else { return 0.0 };
+        let feet = curve.feet(points);
+        let square = |(p, foot): (&[f64; 2], &Foot)| apart(*p, foot.point).powi(2);
+        (points.iter().zip(&feet).map(square).sum::<f64>() / points.len() as f64).sqrt()
+    }
+
     fn fit_from(points: &[[f64; 2]], control: usize, mut order: Vec<f64>) -> Option<Self> {
         let mut curve = Self::new(vec![[0.0; 2]; control])?;
         curve.refit(points, &order)?;
-        for _ in 0..ROUNDS {
-            let feet = curve.feet(points);
-            for (t, foot) in order.iter_mut().zip(feet) {
-                *t = foot.parameter;
+        for round in 1..=ROUNDS {
+            // Feet move little from round to round; the last one looks for them everywhere.
+            if round < ROUNDS {
+                for (t, p) in order.iter_mut().zip(points) {
+                    *t = curve.descend(*p, *t);
+                }
+            } else {
+                for (t, foot) in order.iter_mut().zip(curve.feet(points)) {
+                    *t = foot.parameter;
+                }
             }
             curve.refit(points, &order)?;
         }
@@ -166,15 +173,8 @@ impl DiagramCurve {
         points.iter().map(|&p| self.foot(p, &candidates)).collect()
     }
 
-    fn foot(&self, p: [f64; 2], candidates: &[[f64; 2]]) -> Foot {
-        let square = |c: &[f64; 2]| (c[0] - p[0]).powi(2) + (c[1] - p[1]).powi(2);
-        let mut best = (f64::INFINITY, 0);
-        for (k, c) in candidates.iter().enumerate() {
-            if square(c) < best.0 {
-                best = (square(c), k);
-            }
-        }
-        let mut t = best.1 as f64 / CANDIDATES as f64;
+    /// The parameter of the foot point of `p` that is near to `t`.
+    fn descend(&self, p: [f64; 2], mut t: f64) -> f64 {
         for _ in 0..4 {
             let [c, d, e] = self.derivatives(t);
             let away = [p[0] - c[0], p[1] - c[1]];
@@ -185,6 +185,18 @@ impl DiagramCurve {
             }
             t = (t + (away[0] * d[0] + away[1] * d[1]) / slope).clamp(0.0, 1.0);
         }
+        t
+    }
+
+    fn foot(&self, p: [f64; 2], candidates: &[[f64; 2]]) -> Foot {
+        let square = |c: &[f64; 2]| (c[0] - p[0]).powi(2) + (c[1] - p[1]).powi(2);
+        let mut best = (f64::INFINITY, 0);
+        for (k, c) in candidates.iter().enumerate() {
+            if square(c) < best.0 {
+                best = (square(c), k);
+            }
+        }
+        let t = self.descend(p, best.1 as f64 / CANDIDATES as f64);
         let [point, d, _] = self.derivatives(t);
         let length = d[0].hypot(d[1]);
         let across = if length > 0.0 { [-d[1] / length, d[0] / length] } else { [1.0, 0.0] };
@@ -366,7 +378,7 @@ mod tests {
                 [t, 0.6 * t * t]
             })
             .collect();
-        let curve = DiagramCurve::fit_to(&points).unwrap();
+        let curve = DiagramCurve::fit(&points, CONTROL).unwrap();
         for (foot, p) in curve.feet(&points).iter().zip(&points) {
             let distance = (foot.point[0] - p[0]).hypot(foot.point[1] - p[1]);
             assert!(distance < 2e-3, "{distance}");
@@ -383,7 +395,7 @@ mod tests {
                 [angle.cos(), angle.sin() + 0.02 * f64::from(k % 5)]
             })
             .collect();
-        let curve = DiagramCurve::fit_to(&points).unwrap();
+        let curve = DiagramCurve::fit(&points, CONTROL).unwrap();
         let distance = |(foot, p): (&Foot, &[f64; 2])| apart(foot.point, *p);
         let feet = curve.feet(&points);
         let worst = feet.iter().zip(&points).map(distance).fold(0.0, f64::max);

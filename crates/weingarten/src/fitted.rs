@@ -1,6 +1,6 @@
 //! The curve a curvature diagram follows.
 
-use crate::curve::DiagramCurve;
+use crate::curve::{CONTROL, DiagramCurve};
 use crate::error::Error;
 use crate::grid::SampleGrid;
 use crate::input::Input;
@@ -38,6 +38,6 @@ pub fn fitted_curve<'a>(input: impl Into<Input<'a>>) -> Result<Option<Vec<[f64; 
     let curvature = curvature_size(&surface, &here).unwrap_or(1.0 / place.size());
     let [h, k] = Spread::of(&here, curvature).deviation;
     let points: Vec<[f64; 2]> = here.iter().map(|s| [s.jet.h / h, s.jet.k / k]).collect();
-    let curve = DiagramCurve::fit_to(&points);
+    let curve = DiagramCurve::fit(&points, CONTROL);
     Ok(curve.map(|curve| curve.control().iter().map(|p| [p[0] * h, p[1] * k]).collect()))
 }

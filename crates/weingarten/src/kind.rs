@@ -14,9 +14,20 @@ pub(crate) enum Kind {
     Ratio([f64; 2]),
     /// In coordinates over the deviations.
     Curve(DiagramCurve),
-    /// A curve fitted to the samples at every iterate.
-    CurveFit,
+    /// A curve of so many control points, fitted to the samples at every iterate.
+    CurveFit(usize),
 }
+
+/// A relation farther than this from what the surface has, in units of the curvatures' size, of angles or
+/// of the spread, is gone to in parts.
+const STRIDE: f64 = 0.15;
+/// And in at most so many.
+const MOST_PARTS: usize = 8;
+/// A cloud farther than this from the curve fitted to it, in units of the spread, is too thick or too
+/// branched to be followed: no curve goes along all of it.
+const THICK: f64 = 0.1;
+/// Control points on the way from a line to a curve.
+const FEW_CONTROL: usize = 4;
 
 /// What `H` and `K` are measured in.
 #[derive(Clone, Copy, Debug)]
@@ -41,6 +52,8 @@ pub(crate) struct Regressed {
     kind: Kind,
     /// Mean `H` and `K` over the natural sizes.
     mean: [f64; 2],
+    /// Root mean square distance of the samples from the curve fitted to them, if one is wanted.
+    thickness: f64,
 }
 
 impl Regressed {
@@ -52,7 +65,8 @@ impl Regressed {
             samples.iter().map(|s| [s.jet.h / over[0], s.jet.k / over[1]]).collect();
         let (mean, axis) = principal_axis(&scaled);
         let kind = match wanted {
-            Kind::LinearFit | Kind::CurveFit => return None,
+            Kind::LinearFit => return None,
+            Kind::CurveFit(_) => Kind::LinearFit,
             &Kind::Affine([a, b, _]) => {
                 let own = unit([a * over[0], b * over[1]]);
                 // A constant H or K stays one: only its value is sought.
@@ -75,11 +89,24 @@ impl Regressed {
                 Kind::Curve(fitted.oriented_like(curve))
             }
         };
-        Some(Self { kind, mean })
+        let thickness = match wanted {
+            &Kind::CurveFit(control) => DiagramCurve::thickness(&units.diagram(samples), control),
+            _ => 0.0,
+        };
+        Some(Self { kind, mean, thickness })
+    }
+
+    /// In how many parts the way to `wanted` is to be gone.
+    pub(crate) fn parts(&self, wanted: &Kind, units: &Units) -> usize {
+        if matches!(wanted, Kind::CurveFit(_)) {
+            // A line pulls branches together, and is a curve that can then be bent.
+            return if self.thickness > THICK { 3 } else { 1 };
+        }
+        ((self.distance(wanted, units) / STRIDE).ceil() as usize).clamp(1, MOST_PARTS)
     }
 
     /// How far it is to `wanted`, in units of the natural sizes, of angles, or of the deviations.
-    pub(crate) fn distance(&self, wanted: &Kind, units: &Units) -> f64 {
+    fn distance(&self, wanted: &Kind, units: &Units) -> f64 {
         match (&self.kind, wanted) {
             (Kind::Affine(from), Kind::Affine(to)) => {
                 let (from, to) = (in_sizes(*from, units.size), in_sizes(*to, units.size));
@@ -110,6 +137,8 @@ impl Regressed {
                 Kind::Ratio(turned(from, share * turn(from, to)))
             }
             (Kind::Curve(from), Kind::Curve(to)) => Kind::Curve(from.towards(to, share)),
+            (Kind::LinearFit, Kind::CurveFit(_)) if share < 0.5 => Kind::LinearFit,
+            (Kind::LinearFit, &Kind::CurveFit(control)) => Kind::CurveFit(control.min(FEW_CONTROL)),
             _ => wanted.clone(),
         }
     }
@@ -155,6 +184,7 @@ mod tests {
         let from = Regressed {
             kind: Kind::Affine(line_through([0.4, -0.2], [0.6, 0.8], UNITS.size)),
             mean: [0.4, -0.2],
+            thickness: 0.0,
         };
         let wanted = Kind::Affine([-2.0, 0.3, 1.5]);
         let at = |share: f64| match from.towards(&wanted, share, &UNITS) {
@@ -173,7 +203,7 @@ mod tests {
 
     #[test]
     fn a_ratio_turns_the_shorter_way() {
-        let from = Regressed { kind: Kind::Ratio([0.8, 0.6]), mean: [0.0; 2] };
+        let from = Regressed { kind: Kind::Ratio([0.8, 0.6]), mean: [0.0; 2], thickness: 0.0 };
         let wanted = Kind::Ratio(unit([1.0, -1.0]));
         let Kind::Ratio([c, s]) = from.towards(&wanted, 0.5, &UNITS) else { panic!("a ratio") };
         let half = 0.5 * (0.6f64.atan2(0.8) - std::f64::consts::FRAC_PI_4);

@@ -25,12 +25,6 @@ const WORKING_CURVATURE: f64 = 5.0;
 /// third derivatives of the surface.
 const LEAST_DEGREE: usize = 3;
 
-/// A relation farther than this from what the surface has, in units of the curvatures' size, of angles or
-/// of the spread, is gone to in parts.
-const STRIDE: f64 = 0.15;
-/// And in at most so many.
-const MOST_PARTS: usize = 8;
-
 /// The levels of a run, coarse to fine.
 pub(crate) struct Schedule<'a> {
     /// The reference of every level, in units of the model, centred.
@@ -112,8 +106,7 @@ impl<'a> Schedule<'a> {
             None => coordinates(&first.reference),
         };
         let here = first.sampled(&x)?;
-        let Some((begin, distance)) = target.regressed(&here.samples) else { return Ok(()) };
-        let parts = ((distance / STRIDE).ceil() as usize).clamp(1, MOST_PARTS);
+        let Some((begin, parts)) = target.regressed(&here.samples) else { return Ok(()) };
         let on_the_way = (1..parts).map(|part| Part { net: 0, part, parts });
         self.stages.splice(0..0, on_the_way);
         self.begin = Some(begin);
@@ -185,19 +178,30 @@ fn nets(input: &BsplineSurface, options: &Options) -> Result<Vec<BsplineSurface>
         if can_nest && number + 1 == levels.len() {
             return Ok(refined(input, [counts.u, counts.v])?);
         }
-        let knots = |like: &KnotVector, n: usize| {
-            uniform_like(like, n)
-                .map_err(|source| Error::LevelKnots { level: counts.to_string(), source })
-        };
-        let (u, v) = (knots(input.knots_u(), counts.u)?, knots(input.knots_v(), counts.v)?);
-        if !input.is_rational() && u == *input.knots_u() && v == *input.knots_v() {
-            return Ok(input.clone());
+        let fitted = refit_to(input, *counts)?;
+        if fitted == *input {
+            return Ok(fitted);
         }
-        let fit = |source| Error::Level { level: counts.to_string(), source };
-        let fitted = input.refit(&u, &v).map_err(fit)?;
-        if is_held { with_border_of(&fitted, input).map_err(fit) } else { Ok(fitted) }
+        if is_held {
+            let fit = |source| Error::Level { level: counts.to_string(), source };
+            return with_border_of(&fitted, input).map_err(fit);
+        }
+        Ok(fitted)
     };
     levels.iter().enumerate().map(level).collect()
+}
+
+/// The surface refitted to a net of so many control points; itself if it has that net.
+pub(crate) fn refit_to(input: &BsplineSurface, counts: Counts) -> Result<BsplineSurface, Error> {
+    let knots = |like: &KnotVector, n: usize| {
+        uniform_like(like, n)
+            .map_err(|source| Error::LevelKnots { level: counts.to_string(), source })
+    };
+    let (u, v) = (knots(input.knots_u(), counts.u)?, knots(input.knots_v(), counts.v)?);
+    if !input.is_rational() && u == *input.knots_u() && v == *input.knots_v() {
+        return Ok(input.clone());
+    }
+    input.refit(&u, &v).map_err(|source| Error::Level { level: counts.to_string(), source })
 }
 
 /// Uniform knots of `n` control points with degree, domain and closedness of `like`.

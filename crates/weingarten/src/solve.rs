@@ -396,7 +396,9 @@ struct Watch<'o> {
 /// The best iterate a checkpoint knows of.
 fn best_of(checkpoint: &Checkpoint) -> Option<Best> {
     let numbers = |name: &str| checkpoint.numbers.get(name);
-    Some(Best { value: *numbers("best_value")?.first()?, x: numbers("best")?.clone() })
+    let &[value, measure] = numbers("best_value")?.as_slice() else { return None };
+    let iteration = *checkpoint.counts.get("best_iteration")?.first()? as usize;
+    Some(Best { value, x: numbers("best")?.clone(), progress: (iteration, measure) })
 }
 
 impl Observer for Watch<'_> {
@@ -411,7 +413,9 @@ impl Observer for Watch<'_> {
             judge.see(progress.iteration, false, x);
         }
         let answer = self.observer.step(&Progress { x, ..*progress });
-        self.has_stalled = answer.is_continue() && self.recent.has_stalled(progress);
+        let is_stuck = self.judge.as_ref().is_some_and(|j| j.has_stalled(progress.iteration));
+        let is_flat = self.recent.has_stalled(progress);
+        self.has_stalled = answer.is_continue() && (is_stuck || is_flat);
         if self.has_stalled { ControlFlow::Break(()) } else { answer }
     }
 
@@ -428,8 +432,11 @@ impl Observer for Watch<'_> {
             let state = state().with_numbers("start", start).with_counts("steps", &steps);
             let mut state = state.with_numbers("recent", recent);
             if let Some(best) = best {
-                state =
-                    state.with_numbers("best", &best.x).with_numbers("best_value", &[best.value]);
+                let (iteration, measure) = best.progress;
+                state = state
+                    .with_numbers("best", &best.x)
+                    .with_numbers("best_value", &[best.value, measure])
+                    .with_counts("best_iteration", &[iteration as u64]);
             }
             Checkpoint { method: METHOD.to_owned(), fingerprint, stage, ..state }
         });

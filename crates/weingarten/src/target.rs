@@ -1,6 +1,6 @@
 //! What a [`Relation`] asks of every sample, on the working scale.
 
-use crate::curve::{DiagramCurve, principal_axis};
+use crate::curve::{CONTROL, DiagramCurve, principal_axis};
 use crate::field::Sample;
 use crate::kind::{Kind, Regressed, Units};
 use crate::locus::RelationLocus;
@@ -82,7 +82,7 @@ impl Target {
                 let scaled = |p: &[f64; 2]| [p[0] * h / deviation[0], p[1] * k / deviation[1]];
                 Kind::Curve(DiagramCurve::new(points.iter().map(scaled).collect())?)
             }
-            Relation::CurveFit => Kind::CurveFit,
+            Relation::CurveFit => Kind::CurveFit(CONTROL),
         };
         Some(Self { now: wanted.clone(), wanted, unit, units })
     }
@@ -92,12 +92,12 @@ impl Target {
         &self.wanted
     }
 
-    /// The relation of the same kind nearest to `samples`, where a way to this one begins, and how
-    /// far it is; `None` for what is fitted anyway.
-    pub(crate) fn regressed(&self, samples: &[Sample]) -> Option<(Regressed, f64)> {
+    /// The relation nearest to `samples`, where a way to this one begins, and in how many parts it is to
+    /// be gone; `None` for fitted lines.
+    pub(crate) fn regressed(&self, samples: &[Sample]) -> Option<(Regressed, usize)> {
         let from = Regressed::new(&self.wanted, &self.units, samples)?;
-        let distance = from.distance(&self.wanted, &self.units);
-        Some((from, distance))
+        let parts = from.parts(&self.wanted, &self.units);
+        Some((from, parts))
     }
 
     /// The target asking for what lies at `share` of the way from `begin`.
@@ -135,7 +135,7 @@ impl Target {
             &Kind::Ratio([cosine, sine]) => RelationLocus::Ratio(sine / cosine),
             Kind::LinearFit => line(self.line(samples)),
             Kind::Curve(given) => curve(given),
-            Kind::CurveFit => match DiagramCurve::fit_to(&self.units.diagram(samples)) {
+            &Kind::CurveFit(control) => match self.fitted(samples, control) {
                 Some(fitted) => curve(&fitted),
                 None => line(self.line(samples)),
             },
@@ -144,7 +144,7 @@ impl Target {
 
     /// Whether the rows change from iterate to iterate.
     pub(crate) fn follows(&self) -> bool {
-        matches!(self.now, Kind::LinearFit | Kind::Curve(_) | Kind::CurveFit)
+        matches!(self.now, Kind::LinearFit | Kind::Curve(_) | Kind::CurveFit(_))
     }
 
     /// `cos θ` and `sin θ` of the row over the natural size, and the smoothing of its root, if the
@@ -174,11 +174,15 @@ impl Target {
             }
             Kind::LinearFit => vec![self.line(samples); samples.len()],
             Kind::Curve(curve) => self.tangents(curve, samples),
-            Kind::CurveFit => match DiagramCurve::fit_to(&self.units.diagram(samples)) {
+            &Kind::CurveFit(control) => match self.fitted(samples, control) {
                 Some(curve) => self.tangents(&curve, samples),
                 None => vec![self.line(samples); samples.len()],
             },
         }
+    }
+
+    fn fitted(&self, samples: &[Sample], control: usize) -> Option<DiagramCurve> {
+        DiagramCurve::fit(&self.units.diagram(samples), control)
     }
 
     /// The line of least squared distances in the diagram.
@@ -230,7 +234,7 @@ impl Target {
                 samples.iter().map(|s| a * s.jet.h + b * s.jet.k + c).collect()
             }
             Kind::Curve(curve) => self.distances_from(curve, samples),
-            Kind::CurveFit => match DiagramCurve::fit_to(&self.units.diagram(samples)) {
+            &Kind::CurveFit(control) => match self.fitted(samples, control) {
                 Some(curve) => self.distances_from(&curve, samples),
                 None => vec![0.0; samples.len()],
             },

@@ -17,7 +17,7 @@ use serde::Serialize;
 use std::path::PathBuf;
 use weingarten::{
     Error, HeldCorner, Input, Metrics, Options, RelationLocus, RelationMiss, Solution,
-    fitted_curve, solve,
+    fitted_curve, solve, suited_levels,
 };
 
 /// Arguments of `weingarten`.
@@ -60,13 +60,18 @@ impl Weingarten {
     pub(crate) fn run(self, context: &Context) -> Result<Outcome, Failure> {
         self.output.check()?;
         self.report.check()?;
-        let options = self.options.options(&self.config)?;
+        let mut options = self.options.options(&self.config)?;
         options.check().map_err(|e| self.options.refused(&self.config, e))?;
         let mut watch = Watch::new(context, "optimising")
             .of(&self.input)
             .with_checkpoints(&self.checkpoint)?
             .with_systems(self.system.dump_system.as_deref())?;
         let (model, named) = read_surface(context, &self.input, &self.surface)?;
+        let is_chosen = self.options.is_chosen("levels");
+        if is_chosen {
+            let levels = suited_levels(&named.surface);
+            options.levels = levels.map_err(|e| refused::<Options>(&self.input, e))?.into();
+        }
         context.afford(options.cost(&named.surface), "levels")?;
         let start = self.start.as_deref().map(read_other_surface).transpose()?;
         let mut input = Input::within(&named.surface, named.trim.as_ref());
@@ -81,6 +86,10 @@ impl Weingarten {
             e => refused::<Options>(&self.input, e),
         })?;
         let mut outcome = outcome(&solution, &options, &model.unit)?.with_input(&self.input);
+        if is_chosen {
+            let nets: Vec<String> = options.levels.iter().map(ToString::to_string).collect();
+            outcome.summary.push(format!("  levels chosen        {}", nets.join(", ")));
+        }
         outcome.warnings.extend(model.warnings);
         self.ending.apply(&mut outcome);
         if !watch.finish(&mut outcome) {
