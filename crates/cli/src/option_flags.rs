@@ -37,7 +37,10 @@ impl<O: Fields> OptionFlags<O> {
                 (other.reset)(&mut options);
             }
         }
-        for (field, text) in self.given.iter().filter(|(field, text)| !is_file(field.name, text)) {
+        let is_value = |(field, text): &&(&Field<O>, String)| {
+            !is_file(field.name, text) && !is_auto(field, text)
+        };
+        for (field, text) in self.given.iter().filter(is_value) {
             (field.set)(&mut options, text)
                 .map_err(|e| Failure::usage(format!("{}: {e}", flag(field.name))))?;
         }
@@ -58,6 +61,11 @@ impl<O: Fields> OptionFlags<O> {
         }
     }
 
+    /// Whether the word that stands for what the command chooses was given.
+    pub(crate) fn is_chosen(&self, name: &str) -> bool {
+        self.given.iter().any(|(field, text)| field.name == name && is_auto(field, text))
+    }
+
     /// The file given in place of a value, for options that take one.
     pub(crate) fn file(&self, name: &str) -> Option<&Path> {
         let given =
@@ -68,6 +76,18 @@ impl<O: Fields> OptionFlags<O> {
 
 /// Options that take a file of this extension in place of a value; the command reads it.
 const FILE_VALUES: [(&str, &str); 2] = [("layout", "obj"), ("symmetry", "ron")];
+
+/// The word with which the command is asked to choose the nets of its levels after it has read its input.
+const AUTO: &str = "auto";
+
+/// Whether an option is the list of nets of a method, which the command can choose.
+fn is_nets<O>(field: &Field<O>) -> bool {
+    field.name == "levels" && field.separator.is_some()
+}
+
+fn is_auto<O>(field: &Field<O>, text: &str) -> bool {
+    is_nets(field) && text.trim() == AUTO
+}
 
 fn is_file(name: &str, text: &str) -> bool {
     let extension = exchange::extension_of(Path::new(text));
@@ -119,11 +139,14 @@ fn arg<O: Fields>(field: &'static Field<O>, defaults: &O) -> Arg {
     if let Some((_, extension)) = FILE_VALUES.iter().find(|(name, _)| *name == field.name) {
         help.push_str(&format!(", or the name of a file .{extension}"));
     }
+    if is_nets(field) {
+        help.push_str(&format!("; {AUTO}: nets that suit the input"));
+    }
     if let Some(default) = (field.get)(defaults).filter(|_| !field.is_switch) {
         help.push_str(&format!(" [default: {default}]"));
     }
     let check = move |text: &str| -> Result<String, String> {
-        if is_file(field.name, text) {
+        if is_file(field.name, text) || is_auto(field, text) {
             return Ok(text.to_owned());
         }
         let text = from_file(field.name, text)?;

@@ -24,6 +24,9 @@ pub(crate) fn is_content(command: &str, path: &Path) -> bool {
     if extension == "json" && is_record(path) {
         return false;
     }
+    if extension == "ron" && command == "weingarten" && is_relation(path) {
+        return false;
+    }
     exchange::READABLE.split(", ").any(|known| known == extension)
         || (extension == "csv" && is_panels(command))
 }
@@ -33,6 +36,11 @@ fn is_record(path: &Path) -> bool {
     let text = exchange::read_text(path).unwrap_or_default();
     let value = serde_json::from_str::<serde_json::Value>(&text).unwrap_or_default();
     ["metrics", "fingerprint"].iter().any(|key| value.get(key).is_some())
+}
+
+/// Whether a file holds the control points of a relation.
+fn is_relation(path: &Path) -> bool {
+    exchange::read_ron::<Vec<(f64, f64)>>(path).is_ok()
 }
 
 fn is_panels(command: &str) -> bool {

@@ -8,11 +8,12 @@ use std::path::PathBuf;
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let folder = PathBuf::from(std::env::args().nth(1).unwrap_or_else(|| "fixtures".into()));
-    let scenes: [(&str, BsplineSurface); 9] = [
+    let scenes: [(&str, BsplineSurface); 10] = [
         ("roof", Shape::Roof.surface(14, 14, 4, 4)),
         ("saddle", Shape::Saddle.surface(14, 14, 4, 4)),
         ("near-helical", Shape::Helical.surface(16, 10, 5, 5)),
         ("eggbox", Shape::Eggbox.surface(10, 10, 4, 4)),
+        ("vault", Shape::Vault.surface(12, 12, 4, 4)),
         ("eggbox-coarse", Shape::Eggbox.surface(10, 8, 4, 4)),
         ("tube", Shape::Tube.surface(14, 12, 4, 4)),
         ("plane", surfaces::plane(8, 8, 4)),

@@ -12,6 +12,7 @@
 //! - [`Number`]: a scalar to write a formula on once, with `f64` for values and [`Dual`] for
 //!   derivatives. [`Taylor`] has second derivatives too, [`Series`] all up to some order in one
 //!   variable.
+//! - [`gauss_legendre`]: nodes and weights of quadrature.
 //!
 //! Where two functions do the same in another order of arithmetic, results of callers are compared
 //! bit by bit and depend on it; the file says so.
@@ -40,6 +41,7 @@ mod least_squares;
 mod lu;
 mod matrix;
 mod number;
+mod quadrature;
 mod real;
 mod series;
 mod svd;
@@ -58,6 +60,7 @@ pub use least_squares::{RANK_RATIO, RankError, householder, least_squares, minim
 pub use lu::{gauss_jordan, gauss_jordan_rows, lu_solve};
 pub use matrix::Matrix;
 pub use number::Number;
+pub use quadrature::gauss_legendre;
 pub use real::{Real, Triple};
 pub use series::Series;
 pub use svd::{right_singular_vectors, smallest_eigenvector};

@@ -21,6 +21,10 @@ pub(crate) struct Axis {
     pub(crate) order: usize,
     /// Length of the domain.
     pub(crate) period: f64,
+    /// Where the domain begins.
+    pub(crate) start: f64,
+    /// Weights of the samples if they are the nodes of a quadrature rule.
+    weights: Option<Vec<f64>>,
     /// Parameters on one knot span, one run after the other.
     pub(crate) runs: Vec<Range<usize>>,
     base: Vec<usize>,
@@ -50,7 +54,24 @@ impl Axis {
         let functions = knots.knots().len() - d - 1;
         let (start, end) = knots.domain();
         let (control, period) = (knots.control_count(), end - start);
-        Self { parameters, control, functions, order, period, runs, base, values }
+        Self {
+            parameters,
+            control,
+            functions,
+            order,
+            period,
+            start,
+            weights: None,
+            runs,
+            base,
+            values,
+        }
+    }
+
+    /// The tables at the nodes of a quadrature rule, each with its weight.
+    pub(crate) fn quadrature(knots: &KnotVector, nodes: &[(f64, f64)]) -> Self {
+        let axis = Self::new(knots, nodes.iter().map(|(t, _)| *t).collect());
+        Self { weights: Some(nodes.iter().map(|(_, weight)| *weight).collect()), ..axis }
     }
 
     /// Whether the ends of the domain are joined.
@@ -61,6 +82,27 @@ impl Axis {
     /// Number of samples.
     pub(crate) fn len(&self) -> usize {
         self.parameters.len()
+    }
+
+    /// The length each sample stands for: the weight of the quadrature rule, or from half way to the
+    /// sample before to half way to the next, and to the end of the domain beyond the last ones.
+    pub(crate) fn shares(&self) -> Vec<f64> {
+        if let Some(weights) = &self.weights {
+            return weights.clone();
+        }
+        let t = &self.parameters;
+        let n = t.len();
+        let between = |a: f64, b: f64| 0.5 * (a + b);
+        let cut = |k: usize| -> f64 {
+            match k {
+                0 if self.is_closed() => between(t[n - 1] - self.period, t[0]),
+                0 => self.start,
+                k if k == n && self.is_closed() => between(t[n - 1], t[0] + self.period),
+                k if k == n => self.start + self.period,
+                k => between(t[k - 1], t[k]),
+            }
+        };
+        (0..n).map(|k| cut(k + 1) - cut(k)).collect()
     }
 
     /// The first basis function that is not zero at sample `s`, before wrapping.

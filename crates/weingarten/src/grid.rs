@@ -5,8 +5,9 @@
 
 use std::borrow::Cow;
 
-use bspline::{BsplineSurface, Region, Trim};
+use bspline::{BsplineSurface, KnotVector, Region, Trim};
 use gp_solver::Elements;
+use numerics::gauss_legendre;
 
 use crate::axis::Axis;
 use crate::rational::Rational;
@@ -35,7 +36,10 @@ struct Inside {
 impl SampleGrid {
     /// A grid at the given parameters of `surface`, which must rise and lie in its domain.
     pub(crate) fn new(surface: &BsplineSurface, u: Vec<f64>, v: Vec<f64>) -> Self {
-        let (u, v) = (Axis::new(surface.knots_u(), u), Axis::new(surface.knots_v(), v));
+        Self::of_axes(surface, Axis::new(surface.knots_u(), u), Axis::new(surface.knots_v(), v))
+    }
+
+    fn of_axes(surface: &BsplineSurface, u: Axis, v: Axis) -> Self {
         let rational = surface.weights().map(|weights| Rational::new(&u, &v, weights));
         Self { u, v, rational, inside: None }
     }
@@ -80,11 +84,45 @@ impl SampleGrid {
         Self::new(surface, u, v)
     }
 
+    /// Nodes of Gauss-Legendre quadrature: in every knot span at least as many as `least` says for the
+    /// order of the spline, and together at least `per_control_point` times the control points.
+    pub(crate) fn quadrature(
+        surface: &BsplineSurface,
+        least: impl Fn(usize) -> usize,
+        per_control_point: usize,
+    ) -> Self {
+        let axis = |knots: &KnotVector| {
+            let breaks = knots.breaks();
+            let spans = breaks.len() - 1;
+            let enough = (per_control_point * knots.control_count()).div_ceil(spans);
+            let rule = gauss_legendre(least(knots.degree().order()).max(enough));
+            let span = |ends: &[f64]| {
+                let (start, length) = (ends[0], ends[1] - ends[0]);
+                rule.iter().map(move |(x, weight)| (start + length * x, length * weight))
+            };
+            let nodes: Vec<(f64, f64)> = breaks.windows(2).flat_map(span).collect();
+            Axis::quadrature(knots, &nodes)
+        };
+        Self::of_axes(surface, axis(surface.knots_u()), axis(surface.knots_v()))
+    }
+
     /// The middles of `m_u × m_v` equal cells.
     pub(crate) fn midpoints(surface: &BsplineSurface, m: [usize; 2]) -> Self {
         let u = surface.knots_u().cell_midpoints(m[0]);
         let v = surface.knots_v().cell_midpoints(m[1]);
         Self::new(surface, u, v)
+    }
+
+    /// The share of the domain each sample that counts stands for; together 1.
+    pub(crate) fn shares(&self) -> Vec<f64> {
+        let (u, v) = (self.u.shares(), self.v.shares());
+        let share = |k: usize| {
+            let s = self.place(k);
+            u[s / self.v.len()] * v[s % self.v.len()]
+        };
+        let shares: Vec<f64> = (0..self.count()).map(share).collect();
+        let all: f64 = shares.iter().sum();
+        shares.into_iter().map(|share| share / all).collect()
     }
 
     /// Number of samples.

@@ -25,18 +25,25 @@
 //! # Ok::<(), weingarten::Error>(())
 //! ```
 
+mod area;
 mod axis;
+mod best;
 pub mod blocks;
+mod corners;
 mod curve;
 mod error;
 mod field;
+mod fitted;
 mod grid;
 mod input;
 mod kernel;
+mod kind;
 mod level;
 mod lifted;
 mod locus;
 mod metrics;
+mod miss;
+mod nested;
 mod options;
 mod prepare;
 mod rational;
@@ -44,6 +51,8 @@ mod relation;
 mod sampled;
 mod schedule;
 mod solve;
+mod stall;
+mod suited;
 mod sweep;
 mod target;
 mod tensor;
@@ -51,12 +60,16 @@ mod tensor;
 mod tests;
 mod variables;
 
+pub use corners::HeldCorner;
 pub use error::Error;
+pub use fitted::fitted_curve;
 pub use gp_solver::Status;
 pub use input::Input;
 pub use locus::RelationLocus;
 pub use metrics::Metrics;
+pub use miss::RelationMiss;
 pub use options::{Border, Formulation, Move, Options};
 pub use relation::Relation;
 pub use solve::{Solution, problem, solve, solve_with};
+pub use suited::suited_levels;
 pub use variables::{CONTROL_POINTS, variables};

@@ -28,8 +28,13 @@ pub enum RelationLocus {
     },
     /// `κ₁ = R κ₂` with `κ₁ ≥ κ₂`, for the given `R`.
     Ratio(f64),
-    /// A curve as points `[H, K]` that lie on it.
-    Curve(Vec<[f64; 2]>),
+    /// A cubic B-spline curve.
+    Curve {
+        /// Points `[H, K]` that lie on it, in order.
+        points: Vec<[f64; 2]>,
+        /// Its control points, as [`crate::Relation::Curve`] takes them.
+        control: Vec<[f64; 2]>,
+    },
 }
 
 impl RelationLocus {
@@ -39,7 +44,7 @@ impl RelationLocus {
         match self {
             &Self::Line { a, b, c } => line_points(a, b, c, h, k),
             &Self::Ratio(ratio) => ratio_points(ratio, h, k),
-            Self::Curve(points) => points.clone(),
+            Self::Curve { points, .. } => points.clone(),
         }
     }
 }
@@ -92,7 +97,7 @@ impl fmt::Display for RelationLocus {
                 write!(f, "K = {} H {}", short(-a / b), signed(-c / b))
             }
             Self::Ratio(ratio) => write!(f, "κ₁ = {} κ₂", short(*ratio)),
-            Self::Curve(_) => write!(f, "curve"),
+            Self::Curve { .. } => write!(f, "curve"),
         }
     }
 }

@@ -7,6 +7,7 @@ use crate::field::{Sample, samples};
 use crate::grid::SampleGrid;
 use crate::input::Input;
 use crate::locus::RelationLocus;
+use crate::miss::RelationMiss;
 use crate::target::Target;
 use crate::variables::coordinates;
 
@@ -116,7 +117,7 @@ impl<'a> Meter<'a> {
             mean_curvature_max: h.1,
             gaussian_curvature_min: k.0,
             gaussian_curvature_max: k.1,
-            relation_rms: target.map_or(0.0, |t| t.rms(&rescaled(here, self.unit))),
+            relation_rms: target.map_or(0.0, |t| t.rms(&rescaled(here, self.unit), None)),
         }
     }
 
@@ -124,6 +125,14 @@ impl<'a> Meter<'a> {
     pub(crate) fn locus(&self, surface: &BsplineSurface, target: &Target) -> RelationLocus {
         let grid = SampleGrid::midpoints(surface, self.samples).within(self.trim, surface);
         target.locus(&rescaled(samples(&grid, &coordinates(surface)), self.unit))
+    }
+
+    /// How far `surface` is from the relation, and where.
+    pub(crate) fn miss(&self, surface: &BsplineSurface, target: &Target) -> RelationMiss {
+        let fine = self.samples.map(|m| 2 * m);
+        let grid = SampleGrid::midpoints(surface, fine).within(self.trim, surface);
+        let here = rescaled(samples(&grid, &coordinates(surface)), self.unit);
+        RelationMiss::new(&grid, &here, target)
     }
 
     fn alignment(
@@ -141,18 +150,10 @@ impl<'a> Meter<'a> {
         if range_h <= CONSTANT_RATIO * size || range_k <= CONSTANT_RATIO * size * size {
             return (0.0, 0.0);
         }
-        let (mut sine, mut weight, mut area) = (0.0, 0.0, 0.0);
-        for s in here {
-            let j = s.jacobian();
-            let (grad_h, grad_k) = s.gradients();
-            sine += j * j / s.delta();
-            weight += grad_h * grad_k;
-            area += j.abs();
-        }
+        let area: f64 = here.iter().map(|s| s.jacobian().abs()).sum();
         let (u, v) = (surface.knots_u().domain(), surface.knots_v().domain());
         let cell = (u.1 - u.0) * (v.1 - v.0) / cells as f64;
-        let alignment = if weight > 0.0 { (sine / weight).sqrt() } else { 0.0 };
-        (alignment, area * cell / (range_h * range_k))
+        (alignment_rms(here), area * cell / (range_h * range_k))
     }
 
     /// Largest distance along the open sides, at midpoints and corners, or along the trim.
@@ -191,6 +192,18 @@ impl<'a> Meter<'a> {
         };
         here.iter().zip(&there).map(distance).fold(0.0, f64::max)
     }
+}
+
+/// `√(Σ J²/Δ / Σ |∇_s H|² |∇_s K|²)` over samples.
+pub(crate) fn alignment_rms(here: &[Sample]) -> f64 {
+    let (mut sine, mut weight) = (0.0, 0.0);
+    for s in here {
+        let j = s.jacobian();
+        let (grad_h, grad_k) = s.gradients();
+        sine += j * j / s.delta();
+        weight += grad_h * grad_k;
+    }
+    if weight > 0.0 { (sine / weight).sqrt() } else { 0.0 }
 }
 
 /// Mean and largest same-parameter distance of samples to `input`.

@@ -39,9 +39,10 @@ choices!(Formulation { Reduced = "reduced", Lifted = "lifted" });
 /// use gp_solver::OptionValue;
 /// use weingarten::Border;
 /// assert_eq!(Border::read("glide"), Ok(Border::Glide));
+/// assert_eq!(Border::read("soft=30"), Ok(Border::Soft(30.0)));
 /// assert_eq!(Border::default(), Border::Free);
 /// ```
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Border {
     /// It moves like the rest.
@@ -49,11 +50,35 @@ pub enum Border {
     Free,
     /// Border control points glide on the curve through those of the reference; corners are held.
     Glide,
-    /// It stays as it is.
+    /// It stays as it is: over several levels, that of the input on the last one.
     Fixed,
+    /// Border control points are held with this weight (Pellis et al. 2021, Sec. 3.1.4).
+    Soft(f64),
 }
 
-choices!(Border { Free = "free", Glide = "glide", Fixed = "fixed" });
+impl OptionValue for Border {
+    const FORM: &'static str = "free|glide|fixed|soft=W";
+
+    fn read(text: &str) -> Result<Self, String> {
+        let weight = text.trim().strip_prefix("soft=").map(str::parse);
+        match (text.trim(), weight) {
+            (_, Some(Ok(weight))) => Ok(Self::Soft(weight)),
+            ("free", _) => Ok(Self::Free),
+            ("glide", _) => Ok(Self::Glide),
+            ("fixed", _) => Ok(Self::Fixed),
+            _ => Err(format!("`{text}` is none of free, glide, fixed, soft=W")),
+        }
+    }
+
+    fn print(&self) -> Option<String> {
+        Some(match self {
+            Self::Free => "free".to_owned(),
+            Self::Glide => "glide".to_owned(),
+            Self::Fixed => "fixed".to_owned(),
+            Self::Soft(weight) => format!("soft={weight}"),
+        })
+    }
+}
 
 /// A control point of the input to move before optimising: the moved surface is the reference.
 ///
@@ -132,7 +157,7 @@ options! {
         samples: Option<Counts> = None;
         /// Eliminated unknowns with damped steps, or the published guided projection.
         formulation: Formulation = Formulation::Reduced;
-        /// Whether the border moves freely, glides on its own curve, or stays.
+        /// Whether the border moves freely, glides on its own curve, stays, or is held with a weight.
         border: Border = Border::Free;
         /// Curvature relation: free, linear[=a,b,c] (aH+bK+c=0), minimal, cmc[=H], developable,
         /// gauss=K, ratio=R (k1 = R k2), curve[=H,K;H,K;...].
@@ -181,6 +206,7 @@ impl Options {
             ("shape", self.shape),
             ("fairness", self.fairness),
             ("parallel", self.parallel),
+            ("border", if let Border::Soft(weight) = self.border { weight } else { 0.0 }),
         ];
         for (name, value) in weights {
             if !(value >= 0.0 && value.is_finite()) {

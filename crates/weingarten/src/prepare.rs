@@ -23,32 +23,39 @@ pub(crate) struct Prepared {
     /// All unknowns at the start.
     pub(crate) x: Vec<f64>,
     pub(crate) options: SolverOptions,
+    /// Whether the caller has blocks of its own, which the measures of a surface know nothing of.
+    pub(crate) has_extra: bool,
 }
 
 /// Problem, start and settings of the formulation asked for, with the caller's own blocks.
-/// Scales come from `origin`, where the level begins.
+/// Scales come from `origin`, where the level would begin; it begins at `x`.
 pub(crate) fn prepared(
     level: &Level,
     options: &Options,
     origin: &[f64],
+    x: &[f64],
     extra: &mut Extra<'_, Error>,
 ) -> Result<Prepared, Error> {
     let mut prepared = match options.formulation {
-        Formulation::Reduced => reduced(level, options, origin)?,
+        Formulation::Reduced => reduced(level, options, origin, x)?,
         Formulation::Lifted => auxiliary(level, options, origin)?,
     };
     let variables = prepared.problem.variables().clone();
+    let own = prepared.problem.blocks().count();
     extra(&level.stage, &variables, &mut prepared.problem)?;
+    prepared.has_extra = prepared.problem.blocks().count() != own
+        || prepared.problem.variables().fixed() != variables.fixed();
     Ok(prepared)
 }
 
 /// The eliminated formulation.
-fn reduced(level: &Level, options: &Options, origin: &[f64]) -> Result<Prepared, Error> {
+fn reduced(level: &Level, options: &Options, origin: &[f64], x: &[f64]) -> Result<Prepared, Error> {
     let start = level.sampled(origin)?;
     let rounding = ROUNDING_RMS * options.alignment_weight().max(LAST_ITERATE_WEIGHT);
     Ok(Prepared {
-        problem: level.problem(options, &start)?,
-        x: origin.to_vec(),
+        has_extra: false,
+        problem: level.problem(options, &start, x)?,
+        x: x.to_vec(),
         options: SolverOptions {
             max_iterations: options.iterations,
             damping_rule: DampingRule::Fivefold,
@@ -65,6 +72,7 @@ fn reduced(level: &Level, options: &Options, origin: &[f64]) -> Result<Prepared,
 fn auxiliary(level: &Level, options: &Options, origin: &[f64]) -> Result<Prepared, Error> {
     let x = lifted::start(&level.grid, origin)?;
     Ok(Prepared {
+        has_extra: false,
         problem: lifted::problem(level, options, &x)?,
         options: SolverOptions {
             max_iterations: options.iterations,

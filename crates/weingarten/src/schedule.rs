@@ -1,5 +1,7 @@
 //! What is solved one after the other: the input refitted to each net, on one working scale.
 
+use std::sync::Arc;
+
 use bspline::{BsplineSurface, Degree, KnotError, KnotVector, Trim};
 use geom_core::Normalization;
 use glam::DVec3;
@@ -8,9 +10,13 @@ use gp_solver::{Counts, Stage};
 use crate::error::Error;
 use crate::grid::SampleGrid;
 use crate::input::Input;
-use crate::level::Level;
-use crate::options::{Formulation, Move, Options};
+use crate::kind::Regressed;
+use crate::level::{Asked, Level, relation_grid};
+use crate::nested::{refined, with_border_of};
+use crate::options::{Border, Formulation, Move, Options};
+use crate::relation::Relation;
 use crate::sampled::{check_smooth, curvature_size, regular_samples, sample_counts};
+use crate::target::{Spread, Target};
 use crate::variables::{coordinates, scaled};
 
 /// Mean absolute principal curvature on the working scale (Pellis et al. 2021, Table 1).
@@ -29,6 +35,21 @@ pub(crate) struct Schedule<'a> {
     center: DVec3,
     samples: Option<Counts>,
     trim: Option<&'a Trim>,
+    /// The input on the working scale.
+    input: Arc<BsplineSurface>,
+    target: Option<Target>,
+    /// Where the way to the target begins, if it is taken in several parts.
+    begin: Option<Regressed>,
+    stages: Vec<Part>,
+}
+
+/// A stage: a level, and how far on the way to the relation wanted.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Part {
+    net: usize,
+    /// Which part of how many.
+    part: usize,
+    parts: usize,
 }
 
 impl<'a> Schedule<'a> {
@@ -45,22 +66,81 @@ impl<'a> Schedule<'a> {
         }
         let (center, size) = (place.center(), place.size());
         let input = moved(surface, &options.moves)?;
-        let nets = nets(&input, &options.levels)?;
+        let nets = nets(&input, options)?;
         let unit = working_unit(&nets[0], trim, size, options.samples)?;
-        Ok(Self { nets, unit, center, samples: options.samples, trim })
+        let whole = |net| Part { net, part: 1, parts: 1 };
+        let mut schedule = Self {
+            stages: (0..nets.len()).map(whole).collect(),
+            nets,
+            unit,
+            center,
+            samples: options.samples,
+            trim,
+            input: Arc::new(scaled(&input, unit)?),
+            target: None,
+            begin: None,
+        };
+        if options.relation != Relation::Free {
+            schedule.ask(options, centred.start, place)?;
+        }
+        Ok(schedule)
     }
 
-    /// Number of levels.
+    /// Asks for the relation of the options, in several parts if it is far from what the surface has
+    /// where the run begins.
+    fn ask(
+        &mut self,
+        options: &Options,
+        start: Option<&BsplineSurface>,
+        place: &Normalization,
+    ) -> Result<(), Error> {
+        let grid = relation_grid(&self.input, self.samples).within(self.trim, &self.input);
+        let samples = regular_samples(&grid, &coordinates(&self.input))?;
+        let curvature = curvature_size(&self.input, &samples).unwrap_or(1.0);
+        let spread = Spread::of(&samples, curvature);
+        self.target = Target::new(&options.relation, self.unit, curvature, spread);
+        let Some(target) = &self.target else { return Ok(()) };
+        let first = self.level(0)?;
+        let x = match start {
+            Some(start) => first.started(start, place)?,
+            None => coordinates(&first.reference),
+        };
+        let here = first.sampled(&x)?;
+        let Some((begin, parts)) = target.regressed(&here.samples) else { return Ok(()) };
+        let on_the_way = (1..parts).map(|part| Part { net: 0, part, parts });
+        self.stages.splice(0..0, on_the_way);
+        self.begin = Some(begin);
+        Ok(())
+    }
+
+    /// Number of stages.
     pub(crate) fn len(&self) -> usize {
-        self.nets.len()
+        self.stages.len()
     }
 
-    /// A level on the working scale.
+    /// The relation asked for.
+    pub(crate) fn target(&self) -> Option<&Target> {
+        self.target.as_ref()
+    }
+
+    /// The level of a stage on the working scale.
     pub(crate) fn level(&self, number: usize) -> Result<Level, Error> {
-        let reference = scaled(&self.nets[number], self.unit)?;
-        let name = Counts { u: reference.n_u(), v: reference.n_v() }.to_string();
+        let Part { net, part, parts } = self.stages[number];
+        let reference = scaled(&self.nets[net], self.unit)?;
+        let mut name = Counts { u: reference.n_u(), v: reference.n_v() }.to_string();
+        if part < parts {
+            name = format!("{name} {part}/{parts}");
+        }
         let stage = Stage::new(name, number, self.len()).at(self.center.to_array(), self.unit);
-        Level::new(reference, self.trim, self.samples, stage)
+        let Some(target) = self.target.clone() else {
+            return Level::new(reference, self.trim, self.samples, stage);
+        };
+        let target = match &self.begin {
+            Some(begin) => target.on_the_way(begin, part as f64 / parts as f64),
+            None => target,
+        };
+        let asked = Asked { target, input: Arc::clone(&self.input) };
+        Level::asking(reference, self.trim, self.samples, stage, asked)
     }
 }
 
@@ -77,23 +157,51 @@ fn moved(surface: &BsplineSurface, moves: &[Move]) -> Result<BsplineSurface, Err
     Ok(surface.with_control_points(points)?)
 }
 
-/// The reference at every level: the input refitted to each net, or the input itself.
-fn nets(input: &BsplineSurface, levels: &[Counts]) -> Result<Vec<BsplineSurface>, Error> {
+/// The reference at every level: the input refitted to each net, or the input itself. Where the border is
+/// held, coarse nets hold its corners and the best fit of its curves; the last one contains the input.
+fn nets(input: &BsplineSurface, options: &Options) -> Result<Vec<BsplineSurface>, Error> {
+    let levels = &options.levels;
     if levels.is_empty() {
         return Ok(vec![input.clone()]);
     }
-    let level = |counts: &Counts| {
-        let knots = |like: &KnotVector, n: usize| {
-            uniform_like(like, n)
-                .map_err(|source| Error::LevelKnots { level: counts.to_string(), source })
-        };
-        let (u, v) = (knots(input.knots_u(), counts.u)?, knots(input.knots_v(), counts.v)?);
-        if !input.is_rational() && u == *input.knots_u() && v == *input.knots_v() {
-            return Ok(input.clone());
+    let is_held = options.border != Border::Free;
+    // Closed surfaces stay closed.
+    let is_open = !input.knots_u().is_periodic() && !input.knots_v().is_periodic();
+    let clamped = if is_held && is_open { Some(input.clamped()?) } else { None };
+    let input = clamped.as_ref().unwrap_or(input);
+    // Splines of a raised degree have knots where they are less smooth than curvatures need.
+    let can_nest = matches!(options.border, Border::Fixed | Border::Soft(_))
+        && !input.is_rational()
+        && [input.knots_u(), input.knots_v()].iter().all(|k| k.is_periodic() || k.is_clamped())
+        && input.degree_u().get().min(input.degree_v().get()) >= LEAST_DEGREE;
+    let level = |(number, counts): (usize, &Counts)| {
+        if can_nest && number + 1 == levels.len() {
+            return Ok(refined(input, [counts.u, counts.v])?);
         }
-        input.refit(&u, &v).map_err(|source| Error::Level { level: counts.to_string(), source })
+        let fitted = refit_to(input, *counts)?;
+        if fitted == *input {
+            return Ok(fitted);
+        }
+        if is_held {
+            let fit = |source| Error::Level { level: counts.to_string(), source };
+            return with_border_of(&fitted, input).map_err(fit);
+        }
+        Ok(fitted)
     };
-    levels.iter().map(level).collect()
+    levels.iter().enumerate().map(level).collect()
+}
+
+/// The surface refitted to a net of so many control points; itself if it has that net.
+pub(crate) fn refit_to(input: &BsplineSurface, counts: Counts) -> Result<BsplineSurface, Error> {
+    let knots = |like: &KnotVector, n: usize| {
+        uniform_like(like, n)
+            .map_err(|source| Error::LevelKnots { level: counts.to_string(), source })
+    };
+    let (u, v) = (knots(input.knots_u(), counts.u)?, knots(input.knots_v(), counts.v)?);
+    if !input.is_rational() && u == *input.knots_u() && v == *input.knots_v() {
+        return Ok(input.clone());
+    }
+    input.refit(&u, &v).map_err(|source| Error::Level { level: counts.to_string(), source })
 }
 
 /// Uniform knots of `n` control points with degree, domain and closedness of `like`.

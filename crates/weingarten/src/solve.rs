@@ -8,15 +8,18 @@ use gp_solver::{
     StageReport, Status, System,
 };
 
+use crate::best::{Best, Judge};
+use crate::corners::{HeldCorner, held_corners};
 use crate::error::Error;
 use crate::input::Input;
 use crate::level::Level;
 use crate::locus::RelationLocus;
 use crate::metrics::{Meter, Metrics};
+use crate::miss::RelationMiss;
 use crate::options::{Formulation, Options};
 use crate::prepare::prepared;
-use crate::sampled::SampledSurface;
 use crate::schedule::Schedule;
+use crate::stall::Recent;
 use crate::target::Target;
 use crate::variables::{coordinates, scaled};
 
@@ -52,6 +55,10 @@ pub struct Solution {
     /// Where the relation asked for holds in the curvature diagram, with the coefficients it ended
     /// with; none for [`crate::Relation::Free`].
     pub relation: Option<RelationLocus>,
+    /// How far the result is from the relation asked for, and where most.
+    pub miss: Option<RelationMiss>,
+    /// Corners that keep a mean curvature asked for from being reached while the border is held.
+    pub held_corners: Vec<HeldCorner>,
     /// What the solver did: a stage per level, named after its net.
     pub report: RunReport,
     /// Samples in u and v of the last level.
@@ -151,21 +158,31 @@ pub fn solve_with<'a>(
         None => 0,
     };
     let mut stages: Vec<StageReport> = Vec::new();
-    let mut done: Option<(Level, SampledSurface, BsplineSurface)> = None;
+    let mut done: Option<(Level, BsplineSurface)> = None;
     let mut earlier: Option<(usize, Vec<f64>)> = None;
+    let mut has_gone_astray = false;
     for number in first..schedule.len() {
         let level = schedule.level(number)?;
         let resumed = resume.as_ref().filter(|c| c.stage == number);
         let origin = match (&done, resumed) {
             (_, Some(checkpoint)) => checkpoint.numbers("start", level.unknowns())?.to_vec(),
             (None, None) => coordinates(&level.reference),
-            (Some((.., working)), None) => coordinates(&level.refitted(working)?),
+            (Some((_, working)), None) => {
+                level.bordered(options.border, coordinates(&level.refitted(working)?))
+            }
         };
-        let mut solved = prepared(&level, options, &origin, extra)?;
         // The terms are those of the reference, wherever the run begins.
-        if let (None, None, Some(start)) = (&done, resumed, given.start) {
-            solved.x = level.started(start, &place)?;
-        }
+        let begin = match (number, given.start) {
+            (0, Some(start)) => level.bordered(options.border, level.started(start, &place)?),
+            _ => origin.clone(),
+        };
+        let solved = prepared(&level, options, &origin, &begin, extra)?;
+        // By what the energy has beside the relation or the alignment, an iterate may be better although
+        // these are worse.
+        let is_judged = options.formulation == Formulation::Reduced
+            && options.parallel == 0.0
+            && !solved.has_extra;
+        let judge = is_judged.then(|| Judge::new(&level, resumed.and_then(best_of)));
         let system = System::new(solved.problem, solved.options.factorization)?;
         let mut run = Run::new(system, &solved.x, &solved.options)?;
         if let Some(checkpoint) = resumed {
@@ -178,19 +195,30 @@ pub fn solve_with<'a>(
             steps,
             fingerprint,
             earlier: None,
+            recent: level
+                .recent(options)
+                .resumed(resumed.and_then(|checkpoint| checkpoint.numbers.get("recent"))),
+            has_stalled: false,
+            judge,
         };
-        let status = run.go_on(&level.stage, &mut watch)?;
+        let mut status = run.go_on(&level.stage, &mut watch)?;
+        if watch.has_stalled {
+            status = Status::Stalled;
+        }
         earlier = watch.earlier.filter(|_| status == Status::IterationLimit);
         steps += run.iterations();
-        let working = level.surface(&run.x()[..level.unknowns()])?;
         stages.push(StageReport { stage: level.stage.clone(), solver: run.report(status) });
-        let start = level.sampled(&origin)?;
-        done = Some((level, start, working));
+        let last = &run.x()[..level.unknowns()];
+        let judge = watch.judge.filter(|_| status != Status::Interrupted);
+        let better = judge.and_then(|judge| judge.other_than(run.iterations(), last));
+        has_gone_astray = better.is_some() && level.target().is_some();
+        let working = level.surface(better.as_deref().unwrap_or(last))?;
+        done = Some((level, working));
         if status == Status::Interrupted {
             break;
         }
     }
-    let Some((level, start, working)) = done else {
+    let Some((level, working)) = done else {
         let what = "a run with more levels".to_owned();
         return Err(gp_solver::SolverError::ForeignCheckpoint { what }.into());
     };
@@ -198,7 +226,17 @@ pub fn solve_with<'a>(
     // A net nothing has moved is the input itself, to the last bit.
     let is_input = steps == 0 && options.levels.is_empty() && options.moves.is_empty();
     let working = if is_input { None } else { Some(&working) };
-    let finished = finish(input, place.size(), options, &level, &start, working, earlier, report)?;
+    let finished = finish(
+        input,
+        place.size(),
+        options,
+        schedule.target(),
+        &level,
+        working,
+        earlier,
+        has_gone_astray,
+        report,
+    )?;
     let result =
         if is_input { given.surface.clone() } else { finished.result.translated(place.center()) };
     Ok(Solution { result, ..finished })
@@ -227,7 +265,7 @@ pub fn problem<'a>(
     let centred = given.surface.translated(-place.center());
     let level = Schedule::new(Input { surface: &centred, ..given }, &place, options)?.level(0)?;
     let origin = coordinates(&level.reference);
-    Ok(prepared(&level, options, &origin, &mut |_, _, _| Ok(()))?.problem)
+    Ok(prepared(&level, options, &origin, &origin, &mut |_, _, _| Ok(()))?.problem)
 }
 
 /// Back to the model's units, but still centred, measured and put together. Curvatures are measured
@@ -236,46 +274,70 @@ fn finish(
     input: Input<'_>,
     size: f64,
     options: &Options,
+    target: Option<&Target>,
     level: &Level,
-    start: &SampledSurface,
     working: Option<&BsplineSurface>,
     earlier: Option<(usize, Vec<f64>)>,
+    has_gone_astray: bool,
     mut report: RunReport,
 ) -> Result<Solution, Error> {
     let result = match working {
         Some(working) => scaled(working, 1.0 / level.stage.unit)?,
         None => input.surface.clone(),
     };
-    let target = level.target(options, start);
     let samples = [level.grid.u.len(), level.grid.v.len()];
     let mut flaws =
         if report.iterations > 0 { result.flaws_against(input.surface) } else { Vec::new() };
     if let Some(trim) = input.trim {
         flaws.retain(|flaw| trim.contains(flaw.u, flaw.v));
     }
-    if !flaws.is_empty() && report.status != Status::Interrupted {
-        report.status = Status::Failed;
-    }
     let meter = Meter::new(input, size, samples, level.stage.unit);
     let earlier = match earlier {
         Some((steps, x)) => {
             let surface = scaled(&level.surface(&x)?, 1.0 / level.stage.unit)?;
-            Some((steps, meter.measure(&surface, target.as_ref())))
+            Some((steps, meter.measure(&surface, target)))
         }
         None => None,
     };
+    let miss = target.map(|target| meter.miss(&result, target));
+    report.status = verdict(report.status, !flaws.is_empty(), has_gone_astray, miss.as_ref());
+    let unit = level.stage.unit;
+    let held_corners = target
+        .map(|target| held_corners(input.surface, options.border, target, unit))
+        .unwrap_or_default();
     Ok(Solution {
-        before: meter.measure(input.surface, target.as_ref()),
-        metrics: meter.measure(&result, target.as_ref()),
-        relation: target.as_ref().map(|target| meter.locus(&result, target)),
+        miss,
+        held_corners,
+        before: meter.measure(input.surface, target),
+        metrics: meter.measure(&result, target),
+        relation: target.map(|target| meter.locus(&result, target)),
         report,
         earlier,
         result,
         samples,
         flaws,
         working_scale: level.stage.unit,
-        relation_scale: target.as_ref().map(Target::deviation),
+        relation_scale: target.map(Target::deviation),
     })
+}
+
+/// The status of a run that ended with `ended`: torn results are none, and where the relation asked for
+/// does not hold, the best surface near to the input has been found and not the one wanted.
+fn verdict(
+    ended: Status,
+    is_torn: bool,
+    has_gone_astray: bool,
+    miss: Option<&RelationMiss>,
+) -> Status {
+    let is_missed = miss.is_some_and(|miss| !miss.is_held());
+    match ended {
+        Status::Interrupted => ended,
+        _ if is_torn => Status::Failed,
+        Status::Converged if is_missed => Status::Stalled,
+        // The last steps only led away.
+        Status::IterationLimit if is_missed && has_gone_astray => Status::Stalled,
+        _ => ended,
+    }
 }
 
 /// A start is compared with its reference parameter by parameter.
@@ -326,6 +388,17 @@ struct Watch<'o> {
     fingerprint: u64,
     /// The control points some steps before the last one allowed, and how many.
     earlier: Option<(usize, Vec<f64>)>,
+    recent: Recent,
+    has_stalled: bool,
+    judge: Option<Judge>,
+}
+
+/// The best iterate a checkpoint knows of.
+fn best_of(checkpoint: &Checkpoint) -> Option<Best> {
+    let numbers = |name: &str| checkpoint.numbers.get(name);
+    let &[value, measure] = numbers("best_value")?.as_slice() else { return None };
+    let iteration = *checkpoint.counts.get("best_iteration")?.first()? as usize;
+    Some(Best { value, x: numbers("best")?.clone(), progress: (iteration, measure) })
 }
 
 impl Observer for Watch<'_> {
@@ -336,7 +409,14 @@ impl Observer for Watch<'_> {
         if left > 0 && (self.earlier.is_none() || left >= LAST_STEPS) {
             self.earlier = Some((left, x.to_vec()));
         }
-        self.observer.step(&Progress { x, ..*progress })
+        if let Some(judge) = &mut self.judge {
+            judge.see(progress.iteration, false, x);
+        }
+        let answer = self.observer.step(&Progress { x, ..*progress });
+        let is_stuck = self.judge.as_ref().is_some_and(|j| j.has_stalled(progress.iteration));
+        let is_flat = self.recent.has_stalled(progress);
+        self.has_stalled = answer.is_continue() && (is_stuck || is_flat);
+        if self.has_stalled { ControlFlow::Break(()) } else { answer }
     }
 
     fn stop_requested(&mut self) -> bool {
@@ -346,8 +426,18 @@ impl Observer for Watch<'_> {
     fn checkpoint(&mut self, state: &dyn Fn() -> Checkpoint) {
         let (stage, start, fingerprint) = (self.stage.number, self.start, self.fingerprint);
         let steps = [self.steps as u64];
+        let recent = self.recent.energies();
+        let best = self.judge.as_ref().and_then(Judge::best);
         self.observer.checkpoint(&|| {
             let state = state().with_numbers("start", start).with_counts("steps", &steps);
+            let mut state = state.with_numbers("recent", recent);
+            if let Some(best) = best {
+                let (iteration, measure) = best.progress;
+                state = state
+                    .with_numbers("best", &best.x)
+                    .with_numbers("best_value", &[best.value, measure])
+                    .with_counts("best_iteration", &[iteration as u64]);
+            }
             Checkpoint { method: METHOD.to_owned(), fingerprint, stage, ..state }
         });
     }

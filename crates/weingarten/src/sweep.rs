@@ -15,6 +15,8 @@ use crate::tensor::{Differentiate, ExpandRow, ExpandSample};
 pub(crate) struct Scratch {
     half: Vec<f64>,
     derivatives: Vec<f64>,
+    /// For what a kernel hands on, lent out while a sweep runs.
+    pub(crate) spare: Vec<f64>,
 }
 
 /// What is done with the derivative vectors of a register full of samples.

@@ -1,11 +1,15 @@
 //! Tests that look inside: recorded first steps, Jacobians of every block.
 
+use std::sync::Arc;
+
 use bspline::{BsplineSurface, KnotVector};
 use geom_core::assert_close;
 use gp_solver::{Closeness, Counts, Factorization, ResidualBlock, Stage, System};
 
+use crate::area::CheckGrid;
 use crate::blocks::{
-    Alignment, BorderGlide, Fairness, Field, Net, Parallel, RelationRows, SampledSurface, Shape,
+    Alignment, BorderGlide, Fairness, Field, Net, Parallel, Regularity, RelationRows,
+    SampledSurface, Shape,
 };
 use crate::grid::SampleGrid;
 use crate::level::Level;
@@ -46,7 +50,7 @@ fn first_steps_equal_the_recorded_ones() {
         let q0 = crate::blocks::residual_scale(&start.samples, level.curvature);
         assert_close(q0 / scene.first_step.q0, 1.0, 1e-10);
         for factorization in [Factorization::Auto, Factorization::Sparse] {
-            let problem = level.problem(&options, &start).unwrap();
+            let problem = level.problem(&options, &start, &x).unwrap();
             let mut system = System::new(problem, factorization).unwrap();
             system.refresh(&x);
             let energy = system.linearize(&x).unwrap();
@@ -169,6 +173,26 @@ fn jacobians_of_sample_terms_match_central_differences() {
         for field in [Field::Mean, Field::Gauss] {
             let block = Parallel::new(&start, field, 0.3);
             check_jacobian(&block, &x, 1e-4, 1e-7);
+        }
+    }
+}
+
+/// Shrunk to a quarter of the area, and grown to nine times as much: the barrier is at work everywhere.
+#[test]
+fn jacobians_of_the_barrier_match_central_differences() {
+    for surface in small_surfaces() {
+        let x = coordinates(&surface);
+        let grid = Arc::new(SampleGrid::quadrature(&surface, |_| 2, 1));
+        let check = Arc::new(CheckGrid::new(&surface, &surface, None, &x));
+        let block = Regularity::new(grid, check, &x, 100, 0.8);
+        let mut rows = vec![0.0; block.elements().rows_total()];
+        block.residuals(&x, &mut rows);
+        assert!(rows.iter().all(|r| *r == 0.0));
+        for factor in [0.5, 3.0] {
+            let moved: Vec<f64> = x.iter().map(|v| factor * v).collect();
+            block.residuals(&moved, &mut rows);
+            assert!(rows.iter().all(|r| *r > 0.0));
+            check_jacobian(&block, &moved, 1e-4, 1e-8);
         }
     }
 }

@@ -180,7 +180,8 @@ fn the_locus_of_a_relation_is_told_in_the_model_s_units() {
     );
     // A curve starts and ends at its first and last control point.
     let control = vec![[-0.2, 0.0], [0.0, 0.3], [0.1, -0.1], [0.2, 0.05]];
-    let Some(RelationLocus::Curve(points)) = locus(Relation::Curve(control.clone())).0 else {
+    let Some(RelationLocus::Curve { points, .. }) = locus(Relation::Curve(control.clone())).0
+    else {
         panic!("a curve stays a curve");
     };
     for (got, want) in [(points[0], control[0]), (points[points.len() - 1], control[3])] {

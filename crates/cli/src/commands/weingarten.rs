@@ -10,12 +10,15 @@ use crate::outcome::{Outcome, Status};
 use crate::report_support;
 use crate::report_support::weingarten::weingarten_report;
 use crate::watch::Watch;
-use bspline::{Flaw, FlawKind};
+use bspline::{Flaw, FlawKind, Trim};
 use exchange::{LengthUnit, Model, NamedSurface};
 use gp_solver::{OptionValue, SolverError};
 use serde::Serialize;
 use std::path::PathBuf;
-use weingarten::{Error, Input, Metrics, Options, RelationLocus, Solution, solve};
+use weingarten::{
+    Error, HeldCorner, Input, Metrics, Options, RelationLocus, RelationMiss, Solution,
+    fitted_curve, solve, suited_levels,
+};
 
 /// Arguments of `weingarten`.
 #[derive(Debug, clap::Args)]
@@ -41,6 +44,10 @@ pub(crate) struct Weingarten {
     /// Begin at this result of before: same terms and reference, fresh damping
     #[arg(long, value_name = "RESULT")]
     start: Option<PathBuf>,
+    /// Write the relation found, as control points (H, K) of a curve to edit and give back by
+    /// --relation curve=FILE.ron
+    #[arg(long, value_name = "FILE.ron")]
+    write_relation: Option<PathBuf>,
     #[command(flatten)]
     ending: EndingArgs,
     #[command(flatten)]
@@ -53,13 +60,18 @@ impl Weingarten {
     pub(crate) fn run(self, context: &Context) -> Result<Outcome, Failure> {
         self.output.check()?;
         self.report.check()?;
-        let options = self.options.options(&self.config)?;
+        let mut options = self.options.options(&self.config)?;
         options.check().map_err(|e| self.options.refused(&self.config, e))?;
         let mut watch = Watch::new(context, "optimising")
             .of(&self.input)
             .with_checkpoints(&self.checkpoint)?
             .with_systems(self.system.dump_system.as_deref())?;
         let (model, named) = read_surface(context, &self.input, &self.surface)?;
+        let is_chosen = self.options.is_chosen("levels");
+        if is_chosen {
+            let levels = suited_levels(&named.surface);
+            options.levels = levels.map_err(|e| refused::<Options>(&self.input, e))?.into();
+        }
         context.afford(options.cost(&named.surface), "levels")?;
         let start = self.start.as_deref().map(read_other_surface).transpose()?;
         let mut input = Input::within(&named.surface, named.trim.as_ref());
@@ -74,11 +86,19 @@ impl Weingarten {
             e => refused::<Options>(&self.input, e),
         })?;
         let mut outcome = outcome(&solution, &options, &model.unit)?.with_input(&self.input);
+        if is_chosen {
+            let nets: Vec<String> = options.levels.iter().map(ToString::to_string).collect();
+            outcome.summary.push(format!("  levels chosen        {}", nets.join(", ")));
+        }
         outcome.warnings.extend(model.warnings);
         self.ending.apply(&mut outcome);
         if !watch.finish(&mut outcome) {
             return Ok(outcome);
         }
+        let relation_file = match self.write_relation {
+            Some(path) => Some((path, relation_file(&solution, named.trim.as_ref())?)),
+            None => None,
+        };
         let report = match self.report.wanted() {
             true => {
                 let unit = model.unit.to_string();
@@ -93,11 +113,26 @@ impl Weingarten {
         for path in self.output.output {
             outcome.add_model(path, &result)?;
         }
+        outcome.files.extend(relation_file);
         if let Some(report) = report {
             report_support::add_files(&mut outcome, &self.report, context, report)?;
         }
         Ok(outcome)
     }
+}
+
+/// The control points of the curve the curvature diagram of the result follows, or was asked to.
+fn relation_file(solution: &Solution, trim: Option<&Trim>) -> Result<Vec<u8>, Failure> {
+    let control = match &solution.relation {
+        Some(RelationLocus::Curve { control, .. }) => Some(control.clone()),
+        _ => fitted_curve(Input::within(&solution.result, trim)).map_err(Failure::other)?,
+    };
+    let control = control.ok_or_else(|| {
+        Failure::other("both curvatures are constant: there is no curve to write")
+    })?;
+    let points: Vec<String> =
+        control.iter().map(|[h, k]| format!("    ({h:?}, {k:?}),\n")).collect();
+    Ok(format!("[\n{}]\n", points.concat()).into_bytes())
 }
 
 /// Status, metrics and summary.
@@ -118,6 +153,8 @@ pub(crate) fn outcome(
         working_scale: solution.working_scale,
         relation_scale: solution.relation_scale,
         relation_line: solution.relation.as_ref().and_then(line),
+        relation_miss: solution.miss.as_ref().map(Miss::of),
+        held_corners: solution.held_corners.iter().map(|c| (c.u, c.v)).collect(),
         flaws: solution.flaws.len(),
         flaws_at: solution.flaws.iter().map(|f| (f.kind.as_str(), f.u, f.v)).collect(),
         ms_per_iteration: report.ms_per_iteration(),
@@ -125,6 +162,8 @@ pub(crate) fn outcome(
     })?;
     outcome.summary = summary(solution, unit);
     outcome.warnings.extend(flaw_warning(&solution.flaws));
+    outcome.warnings.extend(miss_warning(solution));
+    outcome.warnings.extend(corner_warning(&solution.held_corners, unit));
     Ok(outcome)
 }
 
@@ -142,19 +181,45 @@ struct Numbers<'a> {
     relation: String,
     /// Lengths `relation_rms` is measured in per length of the model.
     working_scale: f64,
-    /// Standard deviations of H and K at the start on that scale, which distances from fitted lines
+    /// Standard deviations of H and K of the input on that scale, which distances from fitted lines
     /// and curves are measured in.
     #[serde(skip_serializing_if = "Option::is_none")]
     relation_scale: Option<[f64; 2]>,
     /// `a H + b K + c = 0` in units of the model, where the relation is a line.
     #[serde(skip_serializing_if = "Option::is_none")]
     relation_line: Option<Line>,
+    #[serde(flatten, skip_serializing_if = "Option::is_none")]
+    relation_miss: Option<Miss>,
+    /// Corners where the held border alone decides the mean curvature, as another than asked for.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    held_corners: Vec<(f64, f64)>,
     /// Check points where the result folds, has a spike or is not finite, and where.
     flaws: usize,
     #[serde(skip_serializing_if = "Vec::is_empty")]
     flaws_at: Vec<(&'static str, f64, f64)>,
     ms_per_iteration: f64,
     factorizations: usize,
+}
+
+/// How far the result is from the relation: in percent of the curvatures, area-weighted without the
+/// corners, and at its worst.
+#[derive(Serialize)]
+struct Miss {
+    relation_miss_percent: f64,
+    relation_inner_rms: f64,
+    relation_worst: f64,
+    relation_worst_at: [f64; 2],
+}
+
+impl Miss {
+    fn of(miss: &RelationMiss) -> Self {
+        Self {
+            relation_miss_percent: 100.0 * miss.share,
+            relation_inner_rms: miss.inner_rms,
+            relation_worst: miss.worst,
+            relation_worst_at: miss.worst_at,
+        }
+    }
 }
 
 #[derive(Serialize)]
@@ -199,6 +264,30 @@ fn flaw_warning(flaws: &[Flaw]) -> Option<String> {
     ))
 }
 
+/// Why a run that got no further is no surface with the relation asked for.
+fn miss_warning(solution: &Solution) -> Option<String> {
+    let miss = solution.miss.filter(|miss| !miss.is_held())?;
+    (solution.report.status == Status::Stalled).then(|| {
+        format!(
+            "no surface with this relation was found near the input: the nearest misses it by {:.1} % of the curvatures in the mean; leave the border free, lower --closeness, ask for something nearer, or split the surface",
+            100.0 * miss.share
+        )
+    })
+}
+
+/// What a held border makes impossible.
+fn corner_warning(corners: &[HeldCorner], unit: &LengthUnit) -> Option<String> {
+    let first = corners.first()?;
+    let more = match corners.len() {
+        1 => String::new(),
+        n => format!(" (and in {} more corners)", n - 1),
+    };
+    Some(format!(
+        "the border curves meet nearly at a right angle at u = {}, v = {}{more}, where they make the mean curvature {:.4} 1/{unit}, not {:.4}: near there the relation hardly holds while the border is held",
+        first.u, first.v, first.mean_curvature, first.wanted
+    ))
+}
+
 fn summary(solution: &Solution, unit: &LengthUnit) -> Vec<String> {
     let Solution { result: surface, before, metrics: after, report, .. } = solution;
     let mut lines = vec![format!(
@@ -216,10 +305,14 @@ fn summary(solution: &Solution, unit: &LengthUnit) -> Vec<String> {
         "  isoline alignment    {:.6} rms sine (before {:.6})",
         after.alignment_rms, before.alignment_rms
     ));
-    if after.relation_rms > 0.0 {
+    if let Some(miss) = &solution.miss {
         lines.push(format!(
-            "  curvature relation   {:.6} rms (before {:.6})",
-            after.relation_rms, before.relation_rms
+            "  curvature relation   {:.6} rms (before {:.6}), missed by {:.2} %, most at u = {:.4}, v = {:.4}",
+            after.relation_rms,
+            before.relation_rms,
+            100.0 * miss.share,
+            miss.worst_at[0],
+            miss.worst_at[1],
         ));
     }
     lines.push(format!(

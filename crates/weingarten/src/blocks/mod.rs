@@ -8,6 +8,7 @@ mod alignment;
 mod border;
 mod net;
 mod parallel;
+mod regularity;
 mod relation;
 mod rows;
 
@@ -21,4 +22,6 @@ pub(crate) use border::border_points;
 pub use gp_solver::Closeness;
 pub use net::{Fairness, Net, Shape};
 pub use parallel::Parallel;
+pub(crate) use regularity::Regularity;
 pub use relation::RelationRows;
+pub(crate) use relation::reference_rows;

@@ -14,20 +14,23 @@ use crate::kernel::{SECOND, curvature, second};
 use crate::relation::Relation;
 use crate::sampled::SampledSurface;
 use crate::sweep::{LaneKernel, Scratch, load, store};
-use crate::target::Target;
+use crate::target::{Spread, Target};
 
-/// One row per sample, `w (α H + β K + γ)`, with coefficients that follow from the [`Relation`] and,
-/// where it is fitted, from the last iterate; or `w (κ₁ − R κ₂)` for a ratio of the principal
-/// curvatures (Pellis et al. 2021, Sec. 3.2). Coefficients are scaled to the size of the curvatures
-/// at the start, so that a residual of 1 is a miss as large as they are.
+/// One row per sample, `w q (α H + β K + γ)`, with coefficients that follow from the [`Relation`] and,
+/// where it is fitted, from the last iterate; or `w q (κ₁ − R κ₂)/√(1 + R²)` for a ratio of the
+/// principal curvatures (Pellis et al. 2021, Sec. 3.2). Coefficients are scaled to the size of the
+/// curvatures at the start, so that a residual of `w q` is a miss as large as they are. `q²` is the area
+/// at the start that the sample stands for, in units of a quarter of the area per control point: half the
+/// sum of squares is a quadrature of the squared miss, however many samples there are.
 #[derive(Clone, Debug)]
 pub struct RelationRows {
     grid: Arc<SampleGrid>,
     elements: Elements,
     target: Target,
-    /// Rows of `α`, `β`, `γ` for each row of samples, padded.
+    /// Rows of `α`, `β`, `γ` for each row of samples, padded; of `q` for a ratio.
     coefficients: Vec<f64>,
-    weight: f64,
+    /// `w q` of every sample.
+    weights: Vec<f64>,
 }
 
 impl RelationRows {
@@ -40,7 +43,8 @@ impl RelationRows {
         unit: f64,
         weight: f64,
     ) -> Option<Self> {
-        let target = Target::new(relation, unit, start.curvature, &start.samples)?;
+        let spread = Spread::of(&start.samples, start.curvature);
+        let target = Target::new(relation, unit, start.curvature, spread)?;
         Some(Self::of_target(start, target, weight))
     }
 
@@ -48,22 +52,41 @@ impl RelationRows {
         let grid = &start.grid;
         let coefficients = vec![0.0; 3 * grid.u.len() * grid.stride()];
         let elements = grid.elements();
-        let mut made = Self { grid: Arc::clone(grid), elements, target, coefficients, weight };
+        let weights = row_weights(start, weight);
+        let mut made = Self { grid: Arc::clone(grid), elements, target, coefficients, weights };
         made.set_coefficients(&start.samples);
         made
     }
 
     fn set_coefficients(&mut self, samples: &[Sample]) {
         let (m_v, stride) = (self.grid.v.len(), self.grid.stride());
-        let rows = self.target.rows(samples);
-        for (k, row) in rows.iter().enumerate() {
+        let rows = match self.target.ratio() {
+            Some(_) => vec![[1.0; 3]; samples.len()],
+            None => self.target.rows(samples),
+        };
+        for (k, (row, weight)) in rows.iter().zip(&self.weights).enumerate() {
             let s = self.grid.place(k);
             for (which, value) in row.iter().enumerate() {
                 let slot = (3 * (s / m_v) + which) * stride + s % m_v;
-                self.coefficients[slot] = self.weight * value;
+                self.coefficients[slot] = weight * value;
             }
         }
     }
+}
+
+/// `w q` of every sample that counts.
+fn row_weights(start: &SampledSurface, weight: f64) -> Vec<f64> {
+    let areas = start.grid.shares().into_iter().zip(&start.samples);
+    let areas: Vec<f64> = areas.map(|(share, s)| share * s.delta().sqrt()).collect();
+    let all: f64 = areas.iter().sum();
+    let rows = reference_rows(&start.grid) as f64;
+    areas.iter().map(|area| weight * (rows * area / all).sqrt()).collect()
+}
+
+/// How many rows the rows of all samples weigh as much as: four per control point, the samples of the
+/// alignment.
+pub(crate) fn reference_rows(grid: &SampleGrid) -> usize {
+    4 * grid.u.control * grid.v.control
 }
 
 /// `α H + β K + γ`.
@@ -87,26 +110,28 @@ impl LaneKernel<SECOND> for Affine<'_> {
     }
 }
 
-/// `w (κ₁ − R κ₂)` with `κ₁,₂ = H ± √(H² − K + δ²)`.
+/// `w (cos θ κ₁ − sin θ κ₂)` with `κ₁,₂ = H ± √(H² − K + δ²)`.
 struct Ratio<'a> {
-    ratio: f64,
-    scale: f64,
+    row: [f64; 2],
     smoothing: f64,
+    weights: &'a [f64],
     values: RowValues<'a>,
     stride: usize,
 }
 
 impl LaneKernel<SECOND> for Ratio<'_> {
     #[inline(always)]
-    fn run<S: Simd>(&mut self, _: S, at: usize, d: &[Triple<Lanes<S>>; SECOND]) {
+    fn run<S: Simd>(&mut self, simd: S, at: usize, d: &[Triple<Lanes<S>>; SECOND]) {
         let c = curvature(&second(d));
         let smoothing = c.h.constant(self.smoothing);
         let root = (c.h.fma(c.h, smoothing * smoothing) - c.k).sqrt();
-        let (minus, plus) = (self.scale * (1.0 - self.ratio), self.scale * (1.0 + self.ratio));
+        let weight = load(simd, self.weights, at);
+        let [cosine, sine] = self.row;
+        let (minus, plus) = (weight * (cosine - sine), weight * (cosine + sine));
         store(self.values.residual, at, c.h * minus + root * plus);
         if !self.values.gradient.is_empty() {
             let by_root = root.recip() * plus;
-            let alpha = by_root.fma(c.h, c.h.constant(minus));
+            let alpha = by_root.fma(c.h, minus);
             put(self.values.gradient, self.stride, at, &c, alpha, -by_root * 0.5);
         }
     }
@@ -140,12 +165,16 @@ impl SampleTerm<SECOND> for RelationRows {
         values: RowValues<'_>,
     ) {
         let stride = grid.stride();
-        if let Some((ratio, scale, smoothing)) = self.target.ratio() {
-            let scale = self.weight * scale;
-            let mut kernel = Ratio { ratio, scale, smoothing, values, stride };
-            grid.sweep(i, unrolled, scratch, &mut kernel);
+        let rows = &self.coefficients[3 * i * stride..3 * (i + 1) * stride];
+        if let Some((row, smoothing)) = self.target.ratio() {
+            let weights = &rows[..stride];
+            grid.sweep(
+                i,
+                unrolled,
+                scratch,
+                &mut Ratio { row, smoothing, weights, values, stride },
+            );
         } else {
-            let rows = &self.coefficients[3 * i * stride..3 * (i + 1) * stride];
             let coefficients = std::array::from_fn(|k| &rows[k * stride..(k + 1) * stride]);
             grid.sweep(i, unrolled, scratch, &mut Affine { coefficients, values, stride });
         }
