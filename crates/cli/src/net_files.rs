@@ -27,11 +27,7 @@ pub(crate) fn read(
     part: &PartArgs,
 ) -> Result<(NetInput, LengthUnit, Vec<String>), Failure> {
     let refused = |e: &dyn std::fmt::Display| Failure::input(path, e);
-    let is_net = match context.input_format.as_deref() {
-        Some(format) => format == "ron",
-        None => exchange::extension_of(path) == "ron",
-    };
-    if is_net {
+    if is_net(context, path) {
         if !part.part.is_empty() {
             return Err(Failure::usage("--part has no meaning for a net file; leave it out"));
         }
@@ -52,6 +48,14 @@ pub(crate) fn read(
     }
     let (mesh, unit, warnings) = read_mesh(context, path, part)?;
     Ok((NetInput::Mesh(mesh), unit, warnings))
+}
+
+/// Whether a file is to hold a net and not a mesh.
+pub(crate) fn is_net(context: &Context, path: &Path) -> bool {
+    match context.input_format.as_deref() {
+        Some(format) => format == "ron",
+        None => exchange::extension_of(path) == "ron",
+    }
 }
 
 /// Reads the one chosen mesh of a file.

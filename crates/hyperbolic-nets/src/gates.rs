@@ -44,13 +44,18 @@ pub fn inspect(net: &QuadNet, field: &AsymptoticField<'_>) -> GateReport {
             [b - a, c - b, d - c, a - d].map(|e| e.length()).into_iter().fold(0.0, f64::max);
         volume <= PLANAR_RATIO * longest.powi(3)
     };
+    let planar_faces: Vec<usize> =
+        (0..net.quads().len()).filter(|&f| planar(&net.quads()[f])).collect();
+    // A skew quad is a saddle whatever lies around it; this is all that is known of nets too small
+    // for a fit.
+    let skew = 1.0 - planar_faces.len() as f64 / net.quads().len() as f64;
     GateReport {
-        negative_share: field.negative_share(),
+        negative_share: field.known_negative_share().unwrap_or(skew),
         misalignment: field.mean_misalignment(net),
         wrong_twists,
         edges: net.edges().len(),
         folds: net.inner_edges().iter().filter(|e| net.join(e, positions).is_folded()).count(),
-        planar_faces: (0..net.quads().len()).filter(|&f| planar(&net.quads()[f])).collect(),
+        planar_faces,
         two_colourable: net.colours().is_some(),
     }
 }

@@ -33,11 +33,19 @@ pub(crate) fn times(a: DVec2, b: DVec2) -> DVec2 {
 
 impl Field {
     /// Fits the curvatures within `radius` of every vertex, and smooths them a little.
-    pub(crate) fn new(surface: &Surface, radius: f64) -> Result<Self, Error> {
+    pub(crate) fn fitted(surface: &Surface, radius: f64) -> Result<Self, Error> {
         let coarse = || Error::TooCoarse { triangles: surface.triangles.len() };
         let mesh = surface.to_tri_mesh().map_err(|_| coarse())?;
         let forms = vertex_forms(&mesh, radius);
         let tensors: Vec<Option<DMat3>> = forms.iter().map(|f| f.map(|f| f.tensor)).collect();
+        let mut this = Self::of_tensors(surface, &tensors)?;
+        this.smooth(surface);
+        Ok(this)
+    }
+
+    /// The mean over the corners of every triangle of second forms as tensors.
+    pub(crate) fn of_tensors(surface: &Surface, tensors: &[Option<DMat3>]) -> Result<Self, Error> {
+        let coarse = || Error::TooCoarse { triangles: surface.triangles.len() };
         let (mut mean, mut deviator) = (Vec::new(), Vec::new());
         for (f, t) in surface.triangles.iter().enumerate() {
             let known: Vec<DMat3> = t.iter().filter_map(|&v| tensors[v as usize]).collect();
@@ -51,9 +59,7 @@ impl Field {
             mean.push(0.5 * (a + c));
             deviator.push(DVec2::new(0.5 * (a - c), b));
         }
-        let mut this = Self { mean, deviator };
-        this.smooth(surface);
-        Ok(this)
+        Ok(Self { mean, deviator })
     }
 
     /// One implicit step of diffusion, by Jacobi's iteration.

@@ -17,6 +17,8 @@ const DEGENERATE: f64 = 1e-9;
 #[derive(Clone, Debug)]
 pub(crate) struct Repaired {
     pub(crate) surface: Surface,
+    /// The given point each vertex stands on.
+    pub(crate) sources: Vec<u32>,
     pub(crate) warnings: Vec<Warning>,
 }
 
@@ -75,11 +77,13 @@ pub(crate) fn repair<F: AsRef<[u32]>>(points: &[DVec3], faces: &[F]) -> Result<R
         warnings.push(Warning::Split { vertices: split });
     }
     let positions: Vec<DVec3> = sources.iter().map(|&v| points[v as usize]).collect();
-    let (positions, triangles, parts) = largest_part(&positions, triangles);
+    let Part { vertices, triangles, parts } = largest_part(&positions, triangles);
+    let positions = vertices.iter().map(|&v| positions[v as usize]).collect();
+    let sources = vertices.iter().map(|&v| sources[v as usize]).collect();
     if parts > 1 {
         warnings.push(Warning::Parts { parts });
     }
-    Ok(Repaired { surface: Surface::new(positions, triangles), warnings })
+    Ok(Repaired { surface: Surface::new(positions, triangles), sources, warnings })
 }
 
 /// Cuts a polygon: a quad along its shorter diagonal, others as a fan from the corner that makes the
@@ -186,8 +190,17 @@ fn split_vertices(triangles: &[[u32; 3]]) -> Result<Fans, Error> {
     Ok(Fans { triangles: out, sources, split })
 }
 
-/// The edge-connected part with the largest area, its vertices numbered anew, and the number of parts.
-fn largest_part(points: &[DVec3], triangles: Vec<[u32; 3]>) -> (Vec<DVec3>, Vec<[u32; 3]>, usize) {
+/// Some of the triangles, their vertices numbered anew.
+struct Part {
+    /// The number each vertex had.
+    vertices: Vec<u32>,
+    triangles: Vec<[u32; 3]>,
+    /// How many parts there are.
+    parts: usize,
+}
+
+/// The edge-connected part with the largest area.
+fn largest_part(points: &[DVec3], triangles: Vec<[u32; 3]>) -> Part {
     let across = neighbours(&triangles);
     let mut part = vec![NONE; triangles.len()];
     let mut areas: Vec<f64> = Vec::new();
@@ -212,15 +225,15 @@ fn largest_part(points: &[DVec3], triangles: Vec<[u32; 3]>) -> (Vec<DVec3>, Vec<
     }
     let best = (0..areas.len()).fold(0, |best, k| if areas[k] > areas[best] { k } else { best });
     let mut numbers = vec![NONE; points.len()];
-    let (mut kept, mut positions) = (Vec::new(), Vec::new());
+    let (mut kept, mut vertices) = (Vec::new(), Vec::new());
     for (t, _) in triangles.iter().zip(&part).filter(|(_, p)| **p == best as u32) {
         kept.push(t.map(|v| {
             if numbers[v as usize] == NONE {
-                numbers[v as usize] = positions.len() as u32;
-                positions.push(points[v as usize]);
+                numbers[v as usize] = vertices.len() as u32;
+                vertices.push(v);
             }
             numbers[v as usize]
         }));
     }
-    (positions, kept, areas.len())
+    Part { vertices, triangles: kept, parts: areas.len() }
 }

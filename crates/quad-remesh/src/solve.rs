@@ -1,6 +1,7 @@
 //! The whole run: mend, directions, two functions, cells, net.
 
-use geom_core::{DVec3, Normalization, PolyMesh};
+use bspline::BsplineSurface;
+use geom_core::{DMat3, DVec3, Normalization, PolyMesh};
 use gp_solver::{Observer, Status};
 
 use crate::cut::Cut;
@@ -13,6 +14,7 @@ use crate::options::Options;
 use crate::parameters::Parameters;
 use crate::repair::{Repaired, repair};
 use crate::singular::{Matching, Singular, settle, singular_vertices};
+use crate::spline::Sampled;
 use crate::surface::Surface;
 use crate::trace::cells;
 use crate::warning::Warning;
@@ -80,14 +82,58 @@ pub fn solve<F: AsRef<[u32]>>(
     options: &Options,
     observer: &mut dyn Observer,
 ) -> Result<Solution, Error> {
+    run(points, faces, None, options, observer)
+}
+
+/// As [`solve`], of a spline surface: directions come from its own second form, and it is cut into
+/// triangles fine enough for the wanted edges. Closed and periodic surfaces are closed.
+///
+/// # Errors
+/// As [`solve`].
+///
+/// # Example
+/// ```
+/// use bspline::{BsplineSurface, Degree, KnotVector};
+/// use geom_core::DVec3;
+/// use quad_remesh::{Options, solve_surface};
+/// let line = || KnotVector::clamped_uniform(Degree::new(1)?, 2);
+/// let corners = vec![DVec3::ZERO, DVec3::Y, DVec3::X, DVec3::new(1.0, 1.0, 1.0)];
+/// let saddle = BsplineSurface::new(line()?, line()?, corners, None)?; // z = x y
+/// let options = Options { faces: Some(100), ..Options::default() };
+/// let solution = solve_surface(&saddle, &options, &mut ())?;
+/// assert!(solution.metrics.asymptotic_deviation_mean_deg < 0.1);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+pub fn solve_surface(
+    surface: &BsplineSurface,
+    options: &Options,
+    observer: &mut dyn Observer,
+) -> Result<Solution, Error> {
     options.check()?;
-    let Repaired { surface, mut warnings } = repair(points, faces)?;
+    let Sampled { points, triangles, tensors } = Sampled::new(surface, options);
+    run(&points, &triangles, Some(&tensors), options, observer)
+}
+
+/// The run on triangles or polygons, with second forms at the points if they are known.
+fn run<F: AsRef<[u32]>>(
+    points: &[DVec3],
+    faces: &[F],
+    tensors: Option<&[Option<DMat3>]>,
+    options: &Options,
+    observer: &mut dyn Observer,
+) -> Result<Solution, Error> {
+    options.check()?;
+    let Repaired { surface, sources, mut warnings } = repair(points, faces)?;
     // Everything is computed in normalised coordinates.
     let place = Normalization::of(&surface.positions)?;
     let positions = surface.positions.iter().map(|&p| place.apply(p)).collect();
     let surface = Surface::new(positions, surface.triangles);
     let scale = place.scale();
-    let mut run = Run { surface, options, observer, warnings: Vec::new() };
+    // Curvatures are one over lengths.
+    let tensors: Option<Vec<Option<DMat3>>> = tensors.map(|tensors| {
+        sources.iter().map(|&v| tensors[v as usize].map(|t| t * (1.0 / scale))).collect()
+    });
+    let mut run = Run { surface, tensors, options, observer, warnings: Vec::new() };
     let made = run.net(options.edge_length.map(|l| l * scale)).map_err(|e| restored(e, &place))?;
     warnings.append(&mut run.warnings);
     let in_model = |list: &[DVec3]| list.iter().map(|&p| place.restore(p)).collect::<Vec<_>>();
@@ -144,6 +190,8 @@ fn restored(error: Error, place: &Normalization) -> Error {
 
 struct Run<'a> {
     surface: Surface,
+    /// Second forms at the vertices, if they are known and need no fit.
+    tensors: Option<Vec<Option<DMat3>>>,
     options: &'a Options,
     observer: &'a mut dyn Observer,
     warnings: Vec<Warning>,
@@ -241,7 +289,10 @@ impl Run<'_> {
 
     fn directions(&mut self, edge: f64) -> Result<Directions, Error> {
         self.go_on()?;
-        let mut field = Field::new(&self.surface, edge)?;
+        let mut field = match &self.tensors {
+            Some(tensors) => Field::of_tensors(&self.surface, tensors)?,
+            None => Field::fitted(&self.surface, edge)?,
+        };
         let negative_share = field.negative_share(&self.surface);
         if negative_share < NEGATIVE_SHARE[0] {
             let percent = 100.0 * negative_share;

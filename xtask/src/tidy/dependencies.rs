@@ -18,9 +18,10 @@ const ALLOWED: &[(&str, &[&str])] = &[
         "curvature-variation",
         &["subdiv-catmull-clark", "bspline", "geom-core", "gp-solver", "numerics"],
     ),
-    ("quad-remesh", &["geom-core", "gp-solver", "numerics"]),
+    ("quad-remesh", &["bspline", "geom-core", "gp-solver", "numerics"]),
     ("exchange", &["bspline", "geom-core", "numerics", "subdiv-catmull-clark"]),
     ("report", &["bspline", "geom-core", "numerics", "subdiv-catmull-clark"]),
+    ("workflows", &["bspline", "geom-core", "gp-solver", "hyperbolic-nets", "quad-remesh"]),
     ("fixtures", &["bspline", "geom-core", "subdiv-catmull-clark"]),
     // By a path of its own: neither what makes the surfaces nor what solves for them.
     ("verify", &[]),
@@ -44,6 +45,7 @@ const EVERYTHING: &[&str] = &[
     "subdiv-catmull-clark",
     "verify",
     "weingarten",
+    "workflows",
 ];
 
 /// Compares the dependencies of every crate with those it may have.

@@ -8,6 +8,7 @@ use crate::outcome::{Outcome, Status};
 use crate::report_support;
 use curvature_variation::limit_patches;
 use exchange::{LengthUnit, Mesh, Model, NamedSurface};
+use geom_core::diagonal_meshes;
 use serde::Serialize;
 use std::path::{Path, PathBuf};
 
@@ -34,6 +35,9 @@ pub(crate) struct Convert {
     /// share of an edge
     #[arg(long, value_name = "SHARE", default_value_t = 1e-4)]
     tolerance: f64,
+    /// Write a mesh of the diagonals of the quads in place of each mesh: 1 or 2 says which of the two
+    #[arg(long, value_name = "1|2", value_parser = clap::value_parser!(u8).range(1..=2))]
+    diagonals: Option<u8>,
     #[command(flatten)]
     report: ReportArgs,
 }
@@ -51,6 +55,14 @@ impl Convert {
         let mut model = input_file::read(context, &self.input, &self.surface, &self.part)?;
         if let Some(unit) = self.unit.clone() {
             model = model.in_unit(unit).map_err(|e| Failure::input(&self.input, e))?;
+        }
+        if let Some(which) = self.diagonals {
+            for mesh in model.meshes.iter_mut().filter(|mesh| !mesh.faces.is_empty()) {
+                let refused = |e: &dyn std::fmt::Display| Failure::input(&self.input, e);
+                let quads = mesh.to_poly_mesh().map_err(|e| refused(&e))?;
+                let [one, two] = diagonal_meshes(&quads).map_err(|e| refused(&e))?;
+                *mesh = Mesh::from_poly_mesh(if which == 1 { &one } else { &two });
+            }
         }
         let told = self.take_limit_surfaces(&mut model)?;
         let mut outcome = Outcome::new(Status::Converged, 0)

@@ -1,20 +1,22 @@
-//! `umbilic hnet QUADS -o OUT`.
+//! `umbilic hnet INPUT -o OUT`.
 
 use crate::args::{ConfigArgs, EndingArgs, OutputArgs, ReportArgs, SystemArgs};
 use crate::checkpoints::CheckpointArgs;
 use crate::context::Context;
 use crate::failure::Failure;
-use crate::input_file::{self, PartArgs};
+use crate::input_file::{self, PartArgs, SurfaceArgs};
 use crate::net_files::{self, NetInput};
 use crate::net_report;
 use crate::option_flags::{self, OptionFlags};
 use crate::outcome::Outcome;
 use crate::report_support;
 use crate::watch::Watch;
+use exchange::LengthUnit;
 use geom_core::TriMesh;
-use gp_solver::SolverError;
+use gp_solver::{OptionValue, SolverError};
 use hyperbolic_nets::{Error, Input, Options, QuadNet, Solution, solve};
 use std::path::PathBuf;
+use workflows::nets::{Did, InputEdges, Prepared, prepare, prepare_surface};
 
 /// Arguments of `hnet`.
 #[derive(Debug, clap::Args)]
@@ -22,8 +24,11 @@ use std::path::PathBuf;
     after_help = "Example: umbilic hnet fixtures/nets/catenoid-ring.obj -o ring.step -o ring.glb -o ring.ron --metrics ring.json\n\nOutputs: ron (net file), step (exact rational patches), obj (the quads), glb, ply and stl (sampled; glb with curvatures), csv and dxf (wire positions for cutting molds)."
 )]
 pub(crate) struct Hnet {
-    /// Quads that follow the asymptotic directions of a negatively curved surface, or a net file
+    /// Any mesh of a negatively curved surface, best of quads along its asymptotic lines, a B-spline
+    /// surface, or a net file
     input: PathBuf,
+    #[command(flatten)]
+    surface: SurfaceArgs,
     #[command(flatten)]
     part: PartArgs,
     #[command(flatten)]
@@ -31,6 +36,13 @@ pub(crate) struct Hnet {
     /// Mesh of the surface to stay near [default: the input itself]
     #[arg(long, value_name = "MESH")]
     reference: Option<PathBuf>,
+    /// What to do with the edges of a mesh: keep them, take the diagonals of its quads, or make new
+    /// quads; auto does the first of these that follows the asymptotic directions
+    #[arg(long, value_name = "auto|keep|diagonals|remesh", default_value = "auto",
+          value_parser = <InputEdges as OptionValue>::read)]
+    input_edges: InputEdges,
+    #[command(flatten)]
+    remesh: OptionFlags<quad_remesh::Options>,
     #[command(flatten)]
     options: OptionFlags<Options>,
     #[command(flatten)]
@@ -56,13 +68,9 @@ impl Hnet {
             .of(&self.input)
             .with_checkpoints(&self.checkpoint)?
             .with_systems(self.system.dump_system.as_deref())?;
-        let (input, unit, mut warnings) = net_files::read(context, &self.input, &self.part)?;
-        let net = match input {
-            NetInput::Net(surface) => surface.net().clone(),
-            NetInput::Mesh(mesh) => QuadNet::new(&mesh).map_err(refused)?,
-        };
+        let Given { net, surface, unit, mut warnings, did } = self.read(context, &mut watch)?;
         let reference = match &self.reference {
-            None => None,
+            None => surface,
             Some(path) => {
                 let model = input_file::read_other(path, &self.part)?;
                 let mesh = input_file::only_mesh(path, &model)?.to_poly_mesh();
@@ -83,6 +91,7 @@ impl Hnet {
             .with_input(&self.input)
             .with_metrics(metrics)?;
         outcome.summary = summary(&solution);
+        outcome.summary.extend(did.filter(|did| *did != Did::Kept).map(|did| format!("  {did}")));
         outcome.warnings = warnings;
         self.ending.apply(&mut outcome);
         if !watch.finish(&mut outcome) {
@@ -100,6 +109,49 @@ impl Hnet {
             report_support::add_files(&mut outcome, &self.report, context, page)?;
         }
         Ok(outcome)
+    }
+}
+
+/// A net with what it stands for.
+struct Given {
+    net: QuadNet,
+    surface: Option<TriMesh>,
+    unit: LengthUnit,
+    warnings: Vec<String>,
+    did: Option<Did>,
+}
+
+impl Hnet {
+    fn read(&self, context: &Context, watch: &mut Watch<'_>) -> Result<Given, Failure> {
+        if net_files::is_net(context, &self.input) {
+            let (input, unit, warnings) = net_files::read(context, &self.input, &self.part)?;
+            let net = match input {
+                NetInput::Net(surface) => surface.net().clone(),
+                NetInput::Mesh(mesh) => {
+                    QuadNet::new(&mesh).map_err(|e| Failure::input(&self.input, e))?
+                }
+            };
+            return Ok(Given { net, surface: None, unit, warnings, did: None });
+        }
+        let none = ConfigArgs { config: None };
+        let options = self.remesh.options(&none)?;
+        options.check().map_err(|e| self.remesh.refused(&none, e))?;
+        let model = input_file::read(context, &self.input, &self.surface, &self.part)?;
+        let prepared = match &model.surfaces[..] {
+            [named] if model.meshes.is_empty() && named.trim.is_none() => {
+                prepare_surface(&named.surface, &options, watch)
+            }
+            _ => {
+                let mesh = input_file::only_mesh(&self.input, &model)?;
+                let faces: Vec<&[u32]> = mesh.faces.iter().collect();
+                prepare(&mesh.positions, &faces, self.input_edges, &options, watch)
+            }
+        };
+        let Prepared { net, reference, did, warnings } =
+            prepared.map_err(|e| option_flags::refused::<quad_remesh::Options>(&self.input, e))?;
+        let told = warnings.iter().map(|w| option_flags::in_flags::<quad_remesh::Options>(w));
+        let warnings = model.warnings.iter().cloned().chain(told).collect();
+        Ok(Given { net, surface: reference, unit: model.unit, warnings, did: Some(did) })
     }
 }
 

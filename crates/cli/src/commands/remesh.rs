@@ -9,18 +9,20 @@ use crate::outcome::Outcome;
 use crate::report_support::{self, mesh::mesh_view};
 use crate::watch::Watch;
 use exchange::{Mesh, Model};
-use quad_remesh::{Options, Solution, solve};
+use quad_remesh::{Options, Solution, solve, solve_surface};
 use report::{LineRole, LineSet};
 use std::path::PathBuf;
 
 /// Arguments of `remesh`.
 #[derive(Debug, clap::Args)]
 #[command(
-    after_help = "Example: umbilic remesh fixtures/triangles/tower.obj -o quads.obj --faces 300 && umbilic hnet quads.obj -o skin.step --reference fixtures/triangles/tower.obj\n\nGuide: docs/guide/nets.md"
+    after_help = "Example: umbilic remesh fixtures/triangles/tower.obj -o quads.obj --faces 300\n\n`hnet` makes a skin of the quads; with --reference it stays near the mesh they were made from."
 )]
 pub(crate) struct Remesh {
-    /// Triangles or polygons of a negatively curved surface
+    /// Triangles or polygons of a negatively curved surface, or a B-spline surface
     input: PathBuf,
+    #[command(flatten)]
+    surface: SurfaceArgs,
     #[command(flatten)]
     part: PartArgs,
     #[command(flatten)]
@@ -42,11 +44,19 @@ impl Remesh {
         let options = self.options.options(&self.config)?;
         options.check().map_err(|e| self.options.refused(&self.config, e))?;
         let mut watch = Watch::new(context, "net").of(&self.input);
-        let model = input_file::read(context, &self.input, &SurfaceArgs::default(), &self.part)?;
-        let mesh = input_file::only_mesh(&self.input, &model)?;
-        let faces: Vec<&[u32]> = mesh.faces.iter().collect();
-        let solution = solve(&mesh.positions, &faces, &options, &mut watch)
-            .map_err(|e| option_flags::refused::<Options>(&self.input, e))?;
+        let model = input_file::read(context, &self.input, &self.surface, &self.part)?;
+        let solution = match &model.surfaces[..] {
+            // Curves of a trim would be lost, so what is trimmed is not taken.
+            [named] if model.meshes.is_empty() && named.trim.is_none() => {
+                solve_surface(&named.surface, &options, &mut watch)
+            }
+            _ => {
+                let mesh = input_file::only_mesh(&self.input, &model)?;
+                let faces: Vec<&[u32]> = mesh.faces.iter().collect();
+                solve(&mesh.positions, &faces, &options, &mut watch)
+            }
+        };
+        let solution = solution.map_err(|e| option_flags::refused::<Options>(&self.input, e))?;
         let mut outcome = Outcome::new(solution.status, 0)
             .with_input(&self.input)
             .with_metrics(&solution.metrics)?;

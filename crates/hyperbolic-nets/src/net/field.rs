@@ -43,9 +43,15 @@ impl<'a> AsymptoticField<'a> {
         Self { mesh, tensors }
     }
 
-    /// Share of the area with negative Gaussian curvature, 0 to 1.
+    /// Share of the area with negative Gaussian curvature, 0 to 1; of the area where a fit is
+    /// determined, 0 if it is nowhere.
     #[must_use]
     pub fn negative_share(&self) -> f64 {
+        self.known_negative_share().unwrap_or(0.0)
+    }
+
+    /// As [`Self::negative_share`], `None` if no fit is determined anywhere.
+    pub(crate) fn known_negative_share(&self) -> Option<f64> {
         let (mut negative, mut all) = (0.0, 0.0);
         for t in 0..self.mesh.triangles().len() {
             let [a, b, c] = self.mesh.corners(t);
@@ -59,7 +65,7 @@ impl<'a> AsymptoticField<'a> {
                 negative += area;
             }
         }
-        if all > 0.0 { negative / all } else { 0.0 }
+        (all > 0.0).then(|| negative / all)
     }
 
     /// Gaussian curvature at the foot of a point, `None` where no fit is determined.

@@ -107,3 +107,24 @@ fn boundaries_are_kept_or_slid_along() {
         assert!(moved <= most, "{boundary:?}: moved by {moved}");
     }
 }
+
+/// `m × n` quads of the graph `z = 0.7 x y`.
+fn small(m: u32, n: u32) -> QuadNet {
+    let at = |k: u32| (0.4 * f64::from(k / (n + 1)), 0.4 * f64::from(k % (n + 1)));
+    let points = (0..(m + 1) * (n + 1)).map(at);
+    let points = points.map(|(x, y)| geom_core::DVec3::new(x, y, 0.7 * x * y)).collect();
+    let cells = (0..m * n).map(|k| (n + 1) * (k / n) + k % n);
+    let quads: Vec<[u32; 4]> = cells.map(|a| [a, a + n + 1, a + n + 2, a + 1]).collect();
+    QuadNet::new(&PolyMesh::new(points, &quads).unwrap()).unwrap()
+}
+
+#[test]
+fn nets_too_small_for_a_fit_of_curvatures_are_solved() {
+    for (m, n) in [(1, 1), (1, 8), (2, 2)] {
+        let net = small(m, n);
+        let solution = solve(&Input::new(&net), &Options::default(), &mut ()).unwrap();
+        let (report, metrics) = (solution.report, solution.metrics);
+        assert_eq!(report.status, Status::Converged, "{m} × {n}");
+        assert!(metrics.kink_max_deg < 1e-9 && metrics.folds == 0, "{m} × {n}: {metrics:?}");
+    }
+}

@@ -118,6 +118,38 @@ fn tower() {
     on(saddle_meshes::scherk_tower(3, 24), 0.3, &[]);
 }
 
+#[test]
+fn gyroid_cell() {
+    let mesh = saddle_meshes::gyroid_cell(22);
+    let solution = remeshed(&mesh, 0.4);
+    let m = &solution.metrics;
+    assert_eq!((m.euler_characteristic, m.surface_euler_characteristic), (-3, -3), "{m:?}");
+    check(&mesh, &mesh, 0.4, &vec![6; m.irregular_vertices], &CLEAN);
+}
+
+#[test]
+fn eight_cells_have_sixty_four_vertices_of_valence_six() {
+    let mesh = saddle_meshes::schwarz_p_cells(2, 18);
+    let bounds = Bounds { distance: [0.15, 0.03], ..CLEAN };
+    check(&mesh, &mesh, 0.45, &[6; 64], &bounds);
+}
+
+#[test]
+fn coarse_nets_of_a_cell_are_found_or_shortened() {
+    let mesh = saddle_meshes::schwarz_p_cells(1, 20);
+    for edge in [0.8, 1.2] {
+        let options = Options { edge_length: Some(edge), ..Options::default() };
+        match solve(&mesh.positions, &mesh.triangles, &options, &mut ()) {
+            Ok(solution) => {
+                let m = &solution.metrics;
+                assert_eq!(m.odd_valence_vertices, 0);
+                assert!(m.edge_length <= 1.001 * edge, "{m:?}");
+            }
+            Err(error) => assert!(error.to_string().contains("or less"), "{error}"),
+        }
+    }
+}
+
 /// The net of a mesh with this many threads, as bytes.
 fn bytes(mesh: &SaddleMesh, edge: f64, threads: usize) -> Vec<u8> {
     let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("threads");
