@@ -107,7 +107,8 @@ impl Field {
     /// Share of the area that is negatively curved.
     pub(crate) fn negative_share(&self, surface: &Surface) -> f64 {
         let negative = (0..self.mean.len()).filter(|&f| self.is_negative(f));
-        negative.map(|f| surface.areas[f]).sum::<f64>() / surface.area()
+        // A sum of nothing is −0.
+        (0.0 + negative.map(|f| surface.areas[f]).sum::<f64>()) / surface.area()
     }
 
     /// Replaces the field in the triangles of a disc by a harmonic one with a single singular point
