@@ -45,7 +45,8 @@ pub(crate) fn held_corners(
     if border == Border::Free || b != 0.0 || ku.is_periodic() || kv.is_periodic() {
         return Vec::new();
     }
-    let wanted = -c / a * unit;
+    // Not −0, which would be printed.
+    let wanted = 0.0 - c / a * unit;
     let (u, v) = (ku.domain(), kv.domain());
     let grid = SampleGrid::new(input, vec![u.0, u.1], vec![v.0, v.1]);
     let corner = |(k, s): (usize, crate::field::Sample)| {

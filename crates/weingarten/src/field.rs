@@ -20,6 +20,12 @@ pub(crate) struct Sample {
 }
 
 impl Sample {
+    /// Of curvatures alone: a place whose point, metric and slopes nobody asks for.
+    pub(crate) fn of_curvatures(h: f64, k: f64) -> Self {
+        let jet = CurvatureJet { h, k, h_u: 0.0, h_v: 0.0, k_u: 0.0, k_v: 0.0 };
+        Self { point: DVec3::ZERO, e: 1.0, f: 0.0, g: 1.0, jet }
+    }
+
     /// Determinant of the first fundamental form.
     pub(crate) fn delta(&self) -> f64 {
         self.e * self.g - self.f * self.f

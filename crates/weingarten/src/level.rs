@@ -8,8 +8,8 @@ use gp_solver::{Closeness, Problem, Stage};
 
 use crate::area::CheckGrid;
 use crate::blocks::{
-    Alignment, BorderGlide, Fairness, Net, Parallel, Regularity, RelationRows, Shape,
-    border_points, reference_rows,
+    Alignment, BorderGlide, BorderSpacing, Fairness, Net, Parallel, Regularity, RelationRows,
+    Shape, border_points, reference_rows,
 };
 use crate::error::Error;
 use crate::grid::SampleGrid;
@@ -23,6 +23,9 @@ use crate::variables::{control_points, coordinates, scaled, variables};
 /// Weight of gliding borders against distances on the working scale: large enough that the border
 /// stays on its curve to some 1e-4 of the size of the surface.
 const BORDER_WEIGHT: f64 = 100.0;
+/// Weight of the spacing of gliding border points: against a relation held to a percent it keeps them from
+/// bunching, and it hardly weighs against one that is not held yet.
+const SPACING_WEIGHT: f64 = 0.3;
 /// Weight of the distance to the last iterate (Pellis et al. 2021, Table 1).
 pub(crate) const LAST_ITERATE_WEIGHT: f64 = 1e-3;
 /// Nodes per knot span and direction of the barrier on the area element, which varies less than
@@ -217,6 +220,7 @@ impl Level {
         match options.border {
             Border::Glide => {
                 problem.add(BorderGlide::new(net, reference, BORDER_WEIGHT));
+                problem.add(BorderSpacing::new(net, reference, SPACING_WEIGHT));
             }
             Border::Soft(weight) if weight > 0.0 => {
                 let mut weights = vec![0.0; reference.len()];

@@ -11,6 +11,7 @@ use gp_solver::{
 use crate::best::{Best, Judge};
 use crate::corners::{HeldCorner, held_corners};
 use crate::error::Error;
+use crate::field::Sample;
 use crate::input::Input;
 use crate::level::Level;
 use crate::locus::RelationLocus;
@@ -74,6 +75,39 @@ pub struct Solution {
     /// How many steps before the end, ten at most, and what the metrics were there; none where the
     /// run ended otherwise than by the number of steps.
     pub earlier: Option<(usize, Metrics)>,
+    target: Option<Target>,
+}
+
+impl Solution {
+    /// How far places with these mean and Gaussian curvatures, in units of the model, are from the relation
+    /// asked for, as a share of the size of the curvatures (of the input's spread for curves and fitted
+    /// lines, which are fitted to these places). `None` if there is no relation, or a curvature is not
+    /// finite.
+    ///
+    /// # Panics
+    /// If there are not as many of the one as of the other.
+    ///
+    /// # Example
+    /// ```
+    /// use weingarten::{Options, Relation, solve};
+    /// let saddle = fixtures::surfaces::Shape::Saddle.surface(8, 8, 4, 4);
+    /// let options = Options { relation: Relation::Minimal, ..Options::default() };
+    /// let solution = solve(&saddle, &options, &mut ())?;
+    /// let misses = solution.relation_misses(&[0.0, 0.1], &[-1.0, -1.0]).expect("a relation");
+    /// assert!(misses[0] == 0.0 && misses[1] > 0.0);
+    /// # Ok::<(), weingarten::Error>(())
+    /// ```
+    #[must_use]
+    pub fn relation_misses(&self, h: &[f64], k: &[f64]) -> Option<Vec<f64>> {
+        assert_eq!(h.len(), k.len(), "as many mean as Gaussian curvatures");
+        let target = self.target.as_ref()?;
+        let unit = self.working_scale;
+        let place = |(h, k): (&f64, &f64)| Sample::of_curvatures(h / unit, k / (unit * unit));
+        let places: Vec<Sample> = h.iter().zip(k).map(place).collect();
+        let is_finite = places.iter().all(|s| s.jet.h.is_finite() && s.jet.k.is_finite());
+        let natural = target.natural();
+        is_finite.then(|| target.distances(&places).iter().map(|d| d.abs() / natural).collect())
+    }
 }
 
 /// Optimises a surface (`&BsplineSurface`, or an [`Input`]) towards a Weingarten surface near to
@@ -308,6 +342,7 @@ fn finish(
     Ok(Solution {
         miss,
         held_corners,
+        target: target.cloned(),
         before: meter.measure(input.surface, target),
         metrics: meter.measure(&result, target),
         relation: target.map(|target| meter.locus(&result, target)),

@@ -8,8 +8,8 @@ use gp_solver::{Closeness, Counts, Factorization, ResidualBlock, Stage, System};
 
 use crate::area::CheckGrid;
 use crate::blocks::{
-    Alignment, BorderGlide, Fairness, Field, Net, Parallel, Regularity, RelationRows,
-    SampledSurface, Shape,
+    Alignment, BorderGlide, BorderSpacing, Fairness, Field, Net, Parallel, Regularity,
+    RelationRows, SampledSurface, Shape,
 };
 use crate::grid::SampleGrid;
 use crate::level::Level;
@@ -210,6 +210,7 @@ fn jacobians_of_net_terms_match_central_differences() {
         let mut border = BorderGlide::new(net, &x, 1.0);
         border.refresh(&moved);
         check_jacobian(&border, &moved, 1e-3, 1e-10);
+        check_jacobian(&BorderSpacing::new(net, &x, 0.4), &moved, 1e-4, 1e-8);
     }
 }
 

@@ -16,7 +16,7 @@ use gp_solver::{OptionValue, SolverError};
 use serde::Serialize;
 use std::path::PathBuf;
 use weingarten::{
-    Error, HeldCorner, Input, Metrics, Options, RelationLocus, RelationMiss, Solution,
+    Border, Error, HeldCorner, Input, Metrics, Options, RelationLocus, RelationMiss, Solution,
     fitted_curve, solve, suited_levels,
 };
 
@@ -163,7 +163,11 @@ pub(crate) fn outcome(
     outcome.summary = summary(solution, unit);
     outcome.warnings.extend(flaw_warning(&solution.flaws));
     outcome.warnings.extend(miss_warning(solution));
-    outcome.warnings.extend(corner_warning(&solution.held_corners, unit));
+    // A soft border gives way where it must.
+    let is_soft = matches!(options.border, Border::Soft(_));
+    if !(is_soft && solution.miss.is_some_and(|miss| miss.is_held())) {
+        outcome.warnings.extend(corner_warning(&solution.held_corners, unit));
+    }
     Ok(outcome)
 }
 

@@ -2,11 +2,11 @@
 
 use super::energies::energy_history;
 use super::jets::spline_view;
-use crate::failure::Failure;
+use crate::failure::{Failure, refused};
 use crate::report_support::mesh::mesh_view;
 use exchange::{NamedSurface, face_mesh};
 use gp_solver::Counts;
-use report::{RelationCurve, Report};
+use report::{RelationCurve, Report, ScalarField, SurfaceView};
 use weingarten::{Metrics, Options, Relation, RelationLocus, Solution};
 
 /// The surface before and after with its deviation, the energies, and the options in force.
@@ -28,7 +28,7 @@ pub(crate) fn weingarten_report(
     } else {
         report.stages.push(spline_view("before", &[input], None, length_unit)?);
         let after = spline_view("after", &[&solution.result], Some(&[input]), length_unit)?;
-        report.stages.push(after);
+        report.stages.push(with_misses(after, solution)?);
     }
     let levels = solution.report.stages.iter().map(|l| (l.stage.name.clone(), &l.solver));
     report.energies = Some(energy_history(levels));
@@ -44,6 +44,16 @@ pub(crate) fn weingarten_report(
     report.option("levels", nets.join(", "));
     report.option("relation", relation_words(&options.relation, solution));
     Ok(report)
+}
+
+/// The view with a map of where the relation asked for is missed, and by how much.
+fn with_misses(view: SurfaceView, solution: &Solution) -> Result<SurfaceView, Failure> {
+    let (Some(h), Some(k)) = (view.field("H"), view.field("K")) else { return Ok(view) };
+    let Some(misses) = solution.relation_misses(&h.values, &k.values) else { return Ok(view) };
+    let percent = misses.iter().map(|miss| 100.0 * miss).collect();
+    let label = "relation missed, of the curvatures";
+    let field = ScalarField::magnitude("relation-miss", label, "%", percent);
+    view.with_field(field).map_err(refused)
 }
 
 /// The relation over the curvatures of both surfaces.

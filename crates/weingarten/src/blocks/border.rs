@@ -124,6 +124,68 @@ impl ResidualBlock for BorderGlide {
     }
 }
 
+/// `w (l/l⁰ − 1)` for the edges of the control net along the open sides: gliding points keep their
+/// spacing.
+#[derive(Clone, Debug)]
+pub struct BorderSpacing {
+    elements: Elements,
+    /// Ends and length at the reference.
+    edges: Vec<([usize; 2], f64)>,
+    weight: f64,
+}
+
+impl BorderSpacing {
+    /// Keeps the spacing that `reference`, the coordinates of the control points, has.
+    #[must_use]
+    pub fn new(net: Net, reference: &[f64], weight: f64) -> Self {
+        let (mut edges, mut elements) = (Vec::new(), Elements::new());
+        let open_v = if net.closed_v { 0 } else { 2 };
+        for (side, points) in border_points(net).iter().enumerate() {
+            let closed = if side < open_v { net.closed_u } else { net.closed_v };
+            let last = closed.then(|| [points[points.len() - 1], points[0]]);
+            for [a, b] in points.windows(2).map(|p| [p[0], p[1]]).chain(last) {
+                let length = edge(reference, [a, b]).length();
+                // Points of a side collapsed to one have no spacing.
+                if length > 0.0 {
+                    edges.push(([a, b], length));
+                    let column = |k: usize| [3 * k, 3 * k + 1, 3 * k + 2];
+                    elements.push(&[column(a), column(b)].concat(), 1);
+                }
+            }
+        }
+        Self { elements, edges, weight }
+    }
+}
+
+fn edge(x: &[f64], [a, b]: [usize; 2]) -> DVec3 {
+    DVec3::from_slice(&x[3 * b..3 * b + 3]) - DVec3::from_slice(&x[3 * a..3 * a + 3])
+}
+
+impl ResidualBlock for BorderSpacing {
+    fn name(&self) -> &str {
+        "border_spacing"
+    }
+
+    fn elements(&self) -> &Elements {
+        &self.elements
+    }
+
+    fn residuals(&self, x: &[f64], residuals: &mut [f64]) {
+        for (r, &(ends, length)) in residuals.iter_mut().zip(&self.edges) {
+            *r = self.weight * (edge(x, ends).length() / length - 1.0);
+        }
+    }
+
+    fn linearize(&self, x: &[f64], residuals: &mut [f64], jacobian: &mut [f64]) {
+        self.residuals(x, residuals);
+        for (row, &(ends, length)) in jacobian.chunks_exact_mut(6).zip(&self.edges) {
+            let slope = edge(x, ends).normalize_or_zero() * (self.weight / length);
+            row[..3].copy_from_slice(&(-slope).to_array());
+            row[3..].copy_from_slice(&slope.to_array());
+        }
+    }
+}
+
 /// The cubic spline through `points` with chord lengths as parameters and the not-a-knot end
 /// condition; of lower degree if there are fewer than four. `None` if two neighbours coincide.
 fn interpolate(points: &[DVec3], closed: bool) -> Option<BsplineCurve> {

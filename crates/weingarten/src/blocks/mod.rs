@@ -17,8 +17,8 @@ pub use crate::sampled::SampledSurface;
 pub use alignment::Alignment;
 #[cfg(test)]
 pub(crate) use alignment::residual_scale;
-pub use border::BorderGlide;
 pub(crate) use border::border_points;
+pub use border::{BorderGlide, BorderSpacing};
 pub use gp_solver::Closeness;
 pub use net::{Fairness, Net, Shape};
 pub use parallel::Parallel;
