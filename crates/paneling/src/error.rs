@@ -72,7 +72,9 @@ pub enum Error {
     #[error("`{name}` is {value}; it must be positive and finite")]
     BadOption { name: &'static str, value: f64 },
     /// More than one rule for the number of molds.
-    #[error("`k`, `molds` and the bounds `max_kink_deg`, `max_gap` exclude one another; keep one")]
+    #[error(
+        "`k`, `molds` and the bounds `max_kink_deg`, `max_gap`, `max_deviation` exclude one another; keep one"
+    )]
     SeveralRules,
     /// Several types of molds and nothing to choose by.
     #[error(

@@ -127,6 +127,9 @@ pub(crate) struct SeamSide {
     pub(crate) rows: [[f64; SIDE]; 3],
 }
 
+/// A step along the line this small, in panel sizes, is the last: the next would be its square.
+const FOOT_STEP: f64 = 1e-10;
+
 /// Where the line through a design point along its normal meets the mold, and the mold's unit
 /// normal there: offset along the line and normal in local coordinates.
 pub(crate) fn foot(mold: &Mold, local: DVec3, normal: DVec3) -> (f64, DVec3) {
@@ -138,7 +141,7 @@ pub(crate) fn foot(mold: &Mold, local: DVec3, normal: DVec3) -> (f64, DVec3) {
         z = mold.at(q.x, q.y);
         let step = (q.z - z.f) / (normal.z - z.fx * normal.x - z.fy * normal.y);
         t -= step;
-        if step.abs() <= 1e-15 {
+        if step.abs() <= FOOT_STEP {
             break;
         }
     }
