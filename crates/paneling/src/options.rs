@@ -123,6 +123,8 @@ options! {
         /// Width and height of the sheets for flat outlines, in units of the model; without it one
         /// large sheet.
         sheet: Option<SheetSize> = None;
+        /// Length and breadth no panel may exceed, in units of the model, whichever way it lies.
+        panel_max: Option<SheetSize> = None;
         /// Measure the published grid clustering with as many molds beside the own one.
         compare_grid: bool = true;
         /// Second coordinate of the published grid's curvature diagram (rarely needed).
@@ -168,6 +170,8 @@ impl Options {
             ("effort", Some(self.effort)),
             ("sheet", self.sheet.map(|s| s.width)),
             ("sheet", self.sheet.map(|s| s.height)),
+            ("panel_max", self.panel_max.map(|s| s.width)),
+            ("panel_max", self.panel_max.map(|s| s.height)),
         ];
         for (name, value) in positive {
             if let Some(value) = value.filter(|v| !(*v > 0.0 && v.is_finite())) {

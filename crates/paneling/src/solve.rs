@@ -189,7 +189,9 @@ fn run(
     };
     let metrics = Metrics {
         quality: Quality::new(&panels, &result),
-        cost: result.cost(&input.prices),
+        cost: result.cost(&panels, &input.prices),
+        blank_area: result.blanks(&panels).iter().sum(),
+        panel_area: (0..panels.len()).map(|p| panels.area(p)).sum(),
         worst_excess,
         max_deviation,
         grid: of_grid.map(|grid| Quality::new(&panels, grid)),

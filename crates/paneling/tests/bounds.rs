@@ -120,3 +120,29 @@ fn within_bounds_every_gap_is_too() {
     assert!(held.result.measures.gaps.max <= max_gap.unwrap() * (1.0 + 1e-9));
     assert!(held.metrics.quality.molds >= free.metrics.quality.molds);
 }
+
+#[test]
+fn panels_and_blanks_have_their_sizes() {
+    use paneling::{Input, Price, PriceList};
+    // 1.5 by 1 in panels of 0.375 by 0.25.
+    let flat = plane(6, 6, 3);
+    let options = Options { compare_grid: false, ..options(4, 1.0, &[MoldType::Plane]) };
+    let price = Price { mold: 10.0, panel: 2.0, area: 100.0 };
+    let input = Input::from(&flat).with_prices(PriceList::new([(MoldType::Plane, price)]));
+    let solution = solve(input, &options, &mut ()).unwrap();
+    let metrics = solution.metrics;
+    let [long, broad] = solution.panels.breadths(5);
+    assert!((long - 0.375).abs() < 1e-12 && (broad - 0.25).abs() < 1e-12);
+    assert!((metrics.panel_area - 1.5).abs() < 1e-12);
+    assert_eq!(metrics.quality.molds, 1);
+    // The blank holds at least the largest panel.
+    assert!(metrics.blank_area >= 0.375 * 0.25 - 1e-12);
+    let cost = 10.0 + 16.0 * 2.0 + 100.0 * metrics.blank_area;
+    assert!((metrics.cost - cost).abs() < 1e-9);
+    use paneling::SheetSize;
+    let limit =
+        |width, height| Options { panel_max: Some(SheetSize { width, height }), ..options.clone() };
+    assert!(solve(&flat, &limit(0.26, 0.38), &mut ()).is_ok());
+    let error = solve(&flat, &limit(0.3, 0.3), &mut ()).unwrap_err();
+    assert!(matches!(error, Error::PanelTooLarge { panel: 0, .. }), "{error}");
+}

@@ -134,7 +134,7 @@ proptest! {
         mold in 0.0..100.0_f64,
         panel in 0.0..10.0_f64,
     ) {
-        let prices = PriceList::new([(MoldType::Cubic, Price { mold, panel })]);
+        let prices = PriceList::new([(MoldType::Cubic, Price { mold, panel, area: 0.0 })]);
         let solution = solved(Input::from(&surface).with_prices(prices), &options(4));
         prop_assert!(is_near(solution.metrics.cost, 4.0 * mold + 16.0 * panel, 1e-14));
     }

@@ -43,14 +43,14 @@ pub(crate) fn cheapened(
         };
         let of = fit.molds[m].kind;
         let second = two.iter().filter(|h| **h == 1).count();
-        let before = site.prices.cost(of, members.len());
+        let before = site.price(of, members.len());
         for &kind in site.types.iter().filter(|t| **t != of) {
-            let whole = site.prices.cost(kind, members.len());
+            let whole = site.price(kind, members.len());
             changes.push(Change { mold: m, half: None, kind, saving: before - whole });
             for (half, size) in [(0, members.len() - second), (1, second)] {
                 let rest = members.len() - size;
                 if size > 0 && rest > 0 {
-                    let cost = site.prices.cost(kind, size) + site.prices.cost(of, rest);
+                    let cost = site.price(kind, size) + site.price(of, rest);
                     changes.push(Change { mold: m, half: Some(half), kind, saving: before - cost });
                 }
             }

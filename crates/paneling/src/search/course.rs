@@ -278,7 +278,8 @@ impl<'s> Course<'s> {
             },
             steps: if is_merge { self.steps_left() } else { usize::MAX },
             rounds: if is_merge { MERGING_ROUNDS } else { MENDING_ROUNDS },
-            may_split: !is_merge,
+            // Where the number of molds rises, it rises instead.
+            may_split: !is_merge && !self.plan.is_rising(),
             pulse,
             extra,
             stage: self.stage(what, false),
@@ -464,7 +465,7 @@ mod tests {
 
     #[test]
     fn tiny_designs_cost_no_more_than_by_trying_everything() {
-        let price = |mold, panel| Price { mold, panel };
+        let price = |mold, panel| Price { mold, panel, area: 0.0 };
         let plane_first = [
             (MoldType::Plane, price(1.0, 1.0)),
             (MoldType::Paraboloid, price(5.0, 2.0)),

@@ -67,7 +67,7 @@ impl Typed {
         let orders: Vec<Vec<usize>> = sizes
             .iter()
             .map(|&panels| {
-                let cost = |of: usize| site.prices.cost(site.types[of], panels);
+                let cost = |of: usize| site.price(site.types[of], panels);
                 let mut order: Vec<usize> =
                     (0..general).filter(|&of| cost(of) <= cost(general)).collect();
                 order.sort_by(|&a, &b| cost(a).total_cmp(&cost(b)).then(a.cmp(&b)));

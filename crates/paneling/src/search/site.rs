@@ -5,8 +5,8 @@ use crate::fit::clustering::{self, Clusters, Feature};
 use crate::fit::state::Fit;
 use crate::layout::panels::PanelSet;
 use crate::mold::prices::PriceList;
-use crate::mold::shape::MoldType;
-use crate::options::{Clustering, MAX_DEVIATION, MoldRule, Options};
+use crate::mold::shape::{Mold, MoldType, blank};
+use crate::options::{Clustering, MAX_DEVIATION, MoldRule, Options, SheetSize};
 use crate::pulse::Pulse;
 use crate::seam::unknowns::{Hinge, SeamOptions, Seams, Weights};
 use crate::search::bounds::Bounds;
@@ -19,6 +19,8 @@ const BOUNDED_STALL: f64 = 0.1;
 /// Kinks and gaps beyond this share of their bounds pay so much more.
 const LIMIT: f64 = 0.95;
 const HINGE_WEIGHT: f64 = 100.0;
+/// Area of a blank where panels do not lie on it yet: a panel has about 4 in its own size.
+const USUAL_BLANK: f64 = 12.0;
 
 /// Panels, prices and settings of a run. Lengths are in units of the panel size.
 pub(crate) struct Site<'a> {
@@ -57,6 +59,16 @@ impl<'a> Site<'a> {
             && (molds == 0 || molds > panels.len())
         {
             return Err(Error::MoldCount { molds, panels: panels.len() });
+        }
+        if let Some(SheetSize { width, height }) = options.panel_max {
+            let limit = [width.max(height), width.min(height)];
+            for panel in 0..panels.len() {
+                let size = panels.breadths(panel);
+                if size[0] > limit[0] || size[1] > limit[1] {
+                    let [u, v] = panels.middles[panel];
+                    return Err(Error::PanelTooLarge { panel, u, v, size, limit });
+                }
+            }
         }
         let set = panels.scaled(unit);
         let incident = set.incident_seams();
@@ -134,7 +146,19 @@ impl<'a> Site<'a> {
 
     /// Total cost of molds and panels.
     pub(crate) fn cost(&self, fit: &Fit) -> f64 {
-        fit.molds.iter().zip(&fit.members).map(|(m, p)| self.prices.cost(m.kind, p.len())).sum()
+        let of = |(mold, members): (&Mold, &Vec<usize>)| {
+            let border = members
+                .iter()
+                .flat_map(|&p| self.set.border(p).iter().map(move |x| fit.poses[p].to_local(*x)));
+            let area = blank(border) / (self.unit * self.unit);
+            self.prices.cost(mold.kind, members.len(), area)
+        };
+        fit.molds.iter().zip(&fit.members).map(of).sum()
+    }
+
+    /// About what a mold of a type and so many panels on it cost, before they are fitted.
+    pub(crate) fn price(&self, kind: MoldType, panels: usize) -> f64 {
+        self.prices.cost(kind, panels, USUAL_BLANK / (self.unit * self.unit))
     }
 
     /// Of everything a run depends on.
