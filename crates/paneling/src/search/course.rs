@@ -26,11 +26,13 @@ const METHOD: &str = "paneling";
 /// come next, and after molds have been dissolved.
 const NEAR: f64 = 1.5;
 const NEAR_MERGED: f64 = 4.0;
-/// Most rounds of weighing after molds have been dissolved.
+/// Most rounds of weighing and mending where there is a result within the bounds already.
 const MERGING_ROUNDS: usize = 10;
 /// Rounds and steps of a search among [`PANELS`] panels with an effort of 1; among fewer, more.
 const STEPS: f64 = 100.0;
 const PANELS: f64 = 900.0;
+/// With several types so many times as many.
+const SEVERAL_TYPES: f64 = 3.0;
 /// An attempt may cost so many times what the best does: it may yet give up molds.
 const DEARER: f64 = 1.25;
 /// Attempts of a search are shown as so many at least.
@@ -249,7 +251,8 @@ impl<'s> Course<'s> {
     /// Rounds and steps that may still be spent on fewer molds.
     fn steps_left(&self) -> usize {
         let fewer = (PANELS / self.site.set.len() as f64).max(1.0).sqrt();
-        let all = self.site.options.effort * fewer * STEPS;
+        let several = if self.site.types.len() > 1 { SEVERAL_TYPES } else { 1.0 };
+        let all = self.site.options.effort * fewer * several * STEPS;
         (all.ceil() as usize).saturating_sub(self.steps)
     }
 
@@ -277,7 +280,11 @@ impl<'s> Course<'s> {
                 Try::Molds { .. } | Try::Grid | Try::Done => f64::INFINITY,
             },
             steps: if is_merge { self.steps_left() } else { usize::MAX },
-            rounds: if is_merge { MERGING_ROUNDS } else { MENDING_ROUNDS },
+            rounds: if is_merge || self.within().is_some() {
+                MERGING_ROUNDS
+            } else {
+                MENDING_ROUNDS
+            },
             // Where the number of molds rises, it rises instead.
             may_split: !is_merge && !self.plan.is_rising(),
             pulse,
@@ -322,7 +329,7 @@ impl<'s> Course<'s> {
                 }
             }
         }
-        outcome.is_spent = self.steps_left() == 0;
+        outcome.is_spent = self.within().is_some() && self.steps_left() == 0;
         outcome.molds = self.base.as_ref().map_or(0, |b| b.fit.molds.len());
         tracing::debug!(?what, ?outcome, "attempt");
         self.plan.conclude(&outcome);

@@ -43,7 +43,8 @@ pub(crate) struct Outcome {
     pub(crate) excess: f64,
     /// Whether it is within the bounds, and cheaper than before if molds were dissolved.
     pub(crate) is_within: bool,
-    /// Whether the search has taken as many steps as it may.
+    /// Whether there is a result within the bounds and the search has taken as many steps as it
+    /// may.
     pub(crate) is_spent: bool,
     /// Number of molds of the last attempt within the bounds.
     pub(crate) molds: usize,
@@ -108,10 +109,13 @@ impl Plan {
                     self.end()
                 }
             }
+            Try::Molds { .. } if outcome.is_spent => self.end(),
             Try::Molds { .. } => self.next_start(),
             Try::Merge { count, skip } => {
                 let molds = outcome.molds;
-                if molds < 2 || outcome.is_spent {
+                if outcome.is_spent {
+                    self.end()
+                } else if molds < 2 {
                     self.cheapen()
                 } else if outcome.is_within {
                     Try::Merge { count: count.min(molds / 2).max(1), skip: 0 }
@@ -123,7 +127,7 @@ impl Plan {
                     self.cheapen()
                 }
             }
-            Try::Cheapen { .. } if outcome.is_spent => self.next_start(),
+            Try::Cheapen { .. } if outcome.is_spent => self.end(),
             Try::Cheapen { .. } if outcome.is_within => Try::Cheapen { skip: 0 },
             Try::Cheapen { skip } if skip + 1 < SINGLES => Try::Cheapen { skip: skip + 1 },
             Try::Cheapen { .. } => self.next_start(),
