@@ -172,7 +172,8 @@ impl Panelings {
             let quality = Quality::new(&solution.1.panels, &solution.1.result);
             outcome.metrics[key] = serde_json::to_value(quality).map_err(Failure::other)?;
         }
-        outcome.metrics["tolerances"] = serde_json::to_value(&self.table).map_err(Failure::other)?;
+        outcome.metrics["tolerances"] =
+            serde_json::to_value(&self.table).map_err(Failure::other)?;
         Ok(())
     }
 

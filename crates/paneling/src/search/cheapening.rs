@@ -6,9 +6,10 @@ use crate::fit::state::Fit;
 use crate::mold::shape::MoldType;
 use crate::pulse::Pulse;
 use crate::search::bounds::Bounds;
-use crate::search::mending::{SHORT_ALTERNATION, strain};
+use crate::search::mending::SHORT_ALTERNATION;
 use crate::search::rehoming::Merged;
 use crate::search::site::Site;
+use crate::search::strain::strain;
 
 /// Changes that are fitted: those that save most.
 const FITTED: usize = 24;

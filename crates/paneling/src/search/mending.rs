@@ -3,14 +3,13 @@
 
 use crate::fit::clustering::{self, Clusters, Feature};
 use crate::fit::state::Fit;
-use crate::layout::panels::Pose;
-use crate::mold::shape::Mold;
 use crate::pulse::Pulse;
-use crate::seam::measure::{Measures, own_deviation};
+use crate::seam::measure::Measures;
 use crate::seam::unknowns::Weights;
 use crate::search::bounds::Bounds;
 use crate::search::rehoming::{Home, best_home};
 use crate::search::site::Site;
+use crate::search::strain::{strain, strains};
 
 /// Rounds of the alternation for a try of one type, and after a mending.
 pub(crate) const SHORT_ALTERNATION: usize = 4;
@@ -108,19 +107,6 @@ impl Typed {
         }
         Some(result)
     }
-}
-
-/// How many times a panel exceeds half of the bounds of the seams against the design, and how many
-/// times the bound on its distance from the design.
-fn strains(site: &Site<'_>, bounds: &Bounds, mold: &Mold, pose: &Pose, p: usize) -> [f64; 2] {
-    let [kink, gap, deviation] = own_deviation(&site.set, mold, pose, p);
-    [2.0 * bounds.excess(kink, gap), bounds.design_excess(deviation)]
-}
-
-/// The larger of the two.
-pub(crate) fn strain(site: &Site<'_>, bounds: &Bounds, mold: &Mold, pose: &Pose, p: usize) -> f64 {
-    let [seams, design] = strains(site, bounds, mold, pose, p);
-    seams.max(design)
 }
 
 /// Raises the weights of seams and panels that are near or beyond the bounds, and lowers the others.

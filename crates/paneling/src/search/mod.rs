@@ -10,3 +10,4 @@ pub(crate) mod plan;
 pub(crate) mod rehoming;
 pub(crate) mod saved;
 pub(crate) mod site;
+pub(crate) mod strain;

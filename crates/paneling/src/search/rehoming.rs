@@ -9,8 +9,8 @@ use crate::fit::state::{Fit, members_of};
 use crate::layout::panels::Pose;
 use crate::pulse::Pulse;
 use crate::search::bounds::Bounds;
-use crate::search::mending::strain;
 use crate::search::site::Site;
+use crate::search::strain::strain;
 
 /// Molds that are tried for a panel: those of the panels most like it.
 const CANDIDATES: usize = 4;
