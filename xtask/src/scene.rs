@@ -63,7 +63,10 @@ pub(crate) fn look_up<'a>(file: &'a Value, key: &str) -> Option<&'a Value> {
     if matches!(key, "status" | "iterations" | "command") {
         return file.get(key);
     }
-    key.split('.').try_fold(file.get("metrics")?, |at, part| at.get(part))
+    key.split('.').try_fold(file.get("metrics")?, |at, part| match part.parse::<usize>() {
+        Ok(item) if at.is_array() => at.get(item),
+        _ => at.get(part),
+    })
 }
 
 impl Expectation {

@@ -22,6 +22,7 @@ mod panel_files;
 mod paths;
 mod report_support;
 mod stdout;
+mod trade_offs;
 mod watch;
 mod written;
 

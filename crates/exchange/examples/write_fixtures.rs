@@ -8,7 +8,7 @@ use std::path::PathBuf;
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let folder = PathBuf::from(std::env::args().nth(1).unwrap_or_else(|| "fixtures".into()));
-    let scenes: [(&str, BsplineSurface); 10] = [
+    let scenes: [(&str, BsplineSurface); 13] = [
         ("roof", Shape::Roof.surface(14, 14, 4, 4)),
         ("saddle", Shape::Saddle.surface(14, 14, 4, 4)),
         ("near-helical", Shape::Helical.surface(16, 10, 5, 5)),
@@ -19,6 +19,9 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         ("plane", surfaces::plane(8, 8, 4)),
         ("sphere-cap", surfaces::sphere_cap(4, 4)),
         ("torus-patch", surfaces::torus_patch(4, 4)),
+        ("shell", surfaces::shell()),
+        ("wing", surfaces::wing()),
+        ("hall", surfaces::hall()),
     ];
     let mut files = Vec::new();
     for (name, surface) in scenes {

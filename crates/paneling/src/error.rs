@@ -72,7 +72,9 @@ pub enum Error {
     #[error("`{name}` is {value}; it must be positive and finite")]
     BadOption { name: &'static str, value: f64 },
     /// More than one rule for the number of molds.
-    #[error("`k`, `molds` and the bounds `max_kink_deg`, `max_gap` exclude one another; keep one")]
+    #[error(
+        "`k`, `molds` and the bounds `max_kink_deg`, `max_gap`, `max_deviation` exclude one another; keep one"
+    )]
     SeveralRules,
     /// Several types of molds and nothing to choose by.
     #[error(
@@ -88,6 +90,12 @@ pub enum Error {
         size[0], size[1], sheet[0], sheet[1]
     )]
     SheetTooSmall { panel: usize, size: [f64; 2], sheet: [f64; 2] },
+    /// A panel beyond the limit of its size.
+    #[error(
+        "panel {panel} at ({u}, {v}) is {} long and {} broad, but `panel_max` is {} x {}; ask for more `panels` or a larger limit",
+        size[0], size[1], limit[0], limit[1]
+    )]
+    PanelTooLarge { panel: usize, u: f64, v: f64, size: [f64; 2], limit: [f64; 2] },
     /// No type of mold was allowed.
     #[error(
         "`mold_types` is empty; name at least one of plane, cylinder, sphere, paraboloid, torus, cubic"

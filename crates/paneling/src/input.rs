@@ -21,7 +21,7 @@ const EVALUATIONS_PER_PANEL: u64 = 1100;
 /// use paneling::{Input, Layout, Options, Pattern, Price, PriceList, MoldType, solve};
 /// let surface = fixtures::surfaces::Shape::Saddle.surface(10, 10, 4, 4);
 /// let hexagons = Layout::generate(Pattern::Hexagon, 6, 6, [false, false])?;
-/// let prices = PriceList::new([(MoldType::Cubic, Price { mold: 900.0, panel: 45.0 })]);
+/// let prices = PriceList::new([(MoldType::Cubic, Price { mold: 900.0, panel: 45.0, area: 0.0 })]);
 /// let input = Input::from(&surface).with_layout(&hexagons).with_prices(prices);
 /// let solution = solve(input, &Options { molds: Some(4), ..Options::default() }, &mut ())?;
 /// assert_eq!(solution.metrics.cost, 4.0 * 900.0 + 45.0 * hexagons.len() as f64);
@@ -61,6 +61,17 @@ impl<'a> Input<'a> {
         if let Cut::Surface(_, own) = &mut self.cut {
             *own = Some(layout);
         }
+        self
+    }
+
+    /// Another surface with the same layout and prices, also in place of panels that are cut
+    /// already.
+    #[must_use]
+    pub fn with_surface(mut self, other: &'a BsplineSurface) -> Self {
+        self.cut = match self.cut {
+            Cut::Surface(_, layout) => Cut::Surface(other, layout),
+            Cut::Panels(_) => Cut::Surface(other, None),
+        };
         self
     }
 

@@ -33,6 +33,7 @@ mod pulse;
 mod seam;
 mod search;
 mod solve;
+mod trade_off;
 
 pub use blocks::variables;
 pub use error::Error;
@@ -50,3 +51,4 @@ pub use output::workshop::{PanelMesh, PanelRow};
 pub use paneling::Paneling;
 pub use seam::measure::{Measures, SeamMeasure, Spread};
 pub use solve::{Solution, problem, solve, solve_with};
+pub use trade_off::{Diagram, FINENESS, Law, TradeOff, trade_off};

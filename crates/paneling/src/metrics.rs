@@ -101,10 +101,18 @@ pub struct Metrics {
     pub quality: Quality,
     /// Total cost of molds and panels.
     pub cost: f64,
-    /// How many times the worst seam exceeds the bounds, at most 1 if all are within; none without
-    /// bounds.
+    /// Total area of the molds, each the rectangle around its panels in its frame.
+    pub blank_area: f64,
+    /// Total area of the panels, each of the polygon through the samples of its border.
+    pub panel_area: f64,
+    /// How many times the worst seam or panel exceeds the bounds, at most 1 if all are within; none
+    /// without bounds.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub worst_excess: Option<f64>,
+    /// The bound on the distance of every panel from the design, in units of the model; none
+    /// without bounds.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub max_deviation: Option<f64>,
     /// The published grid clustering with as many molds; none if it is not to be compared with, or
     /// the panels were covered.
     #[serde(skip_serializing_if = "Option::is_none")]

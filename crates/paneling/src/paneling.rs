@@ -1,8 +1,9 @@
 //! Panels on their molds.
 
+use crate::fit::state::members_of;
 use crate::layout::panels::{PanelSet, Pose};
 use crate::mold::prices::PriceList;
-use crate::mold::shape::Mold;
+use crate::mold::shape::{Mold, blank};
 use crate::seam::measure::{Measures, measure};
 use crate::search::attempt::Found;
 use geom_core::DVec3;
@@ -15,9 +16,13 @@ use geom_core::DVec3;
 /// let surface = fixtures::surfaces::Shape::Saddle.surface(8, 8, 4, 4);
 /// let panels = Some(Counts { u: 4, v: 3 });
 /// let options = Options { panels, molds: Some(3), ..Options::default() };
-/// let paneling = solve(&surface, &options, &mut ())?.result;
-/// let prices = PriceList::new([(MoldType::Cubic, Price { mold: 900.0, panel: 45.0 })]);
-/// assert_eq!(paneling.cost(&prices), 3.0 * 900.0 + 12.0 * 45.0);
+/// let solution = solve(&surface, &options, &mut ())?;
+/// let (paneling, panels) = (&solution.result, &solution.panels);
+/// let area: f64 = paneling.blanks(panels).iter().sum();
+/// let price = Price { mold: 900.0, panel: 45.0, area: 20.0 };
+/// let prices = PriceList::new([(MoldType::Cubic, price)]);
+/// let cost = 3.0 * 900.0 + 12.0 * 45.0 + 20.0 * area;
+/// assert!((paneling.cost(panels, &prices) - cost).abs() < 1e-9 * cost);
 /// # Ok::<(), paneling::Error>(())
 /// ```
 #[derive(Clone, Debug, PartialEq)]
@@ -57,12 +62,25 @@ impl Paneling {
         self
     }
 
-    /// Total cost of molds and panels.
+    /// Total cost of molds, their blanks and panels.
     #[must_use]
-    pub fn cost(&self, prices: &PriceList) -> f64 {
-        let mut counts = vec![0; self.molds.len()];
-        self.labels.iter().for_each(|&m| counts[m] += 1);
-        self.molds.iter().zip(counts).map(|(m, n)| prices.cost(m.kind, n)).sum()
+    pub fn cost(&self, set: &PanelSet, prices: &PriceList) -> f64 {
+        let members = members_of(&self.labels, self.molds.len());
+        let molds = self.molds.iter().zip(members).zip(self.blanks(set));
+        molds.map(|((m, panels), area)| prices.cost(m.kind, panels.len(), area)).sum()
+    }
+
+    /// The area of each mold: of the rectangle around its panels in its frame.
+    #[must_use]
+    pub fn blanks(&self, set: &PanelSet) -> Vec<f64> {
+        let of = |panels: &Vec<usize>| {
+            blank(
+                panels
+                    .iter()
+                    .flat_map(|&p| set.border(p).iter().map(move |x| self.poses[p].to_local(*x))),
+            )
+        };
+        members_of(&self.labels, self.molds.len()).iter().map(of).collect()
     }
 
     /// Rounds of the alternation and seam steps.

@@ -9,6 +9,7 @@ use crate::options::{Clustering, Options};
 use crate::paneling::Paneling;
 use crate::pulse::Pulse;
 use crate::seam::general::SeamProblem;
+use crate::seam::unknowns::Weights;
 use crate::search::attempt::Found;
 use crate::search::course::{Course, bare};
 use crate::search::site::Site;
@@ -43,7 +44,7 @@ pub struct Solution {
     pub grid: Option<Paneling>,
     /// How it went: the stages `fit` and `seams` of the result.
     ///
-    /// [`Converged`](Status::Converged) if every seam is within the bounds, or without bounds if the
+    /// [`Converged`](Status::Converged) if every seam and panel is within the bounds, or without bounds if the
     /// last step lowered the energy by less than its stop rule asks; else
     /// [`Infeasible`](Status::Infeasible) under bounds, [`Stalled`](Status::Stalled) if no step
     /// lowers the energy any more, and [`IterationLimit`](Status::IterationLimit).
@@ -146,12 +147,12 @@ pub fn problem<'a>(
     let mut nobody = ();
     let pulse = Pulse::new(&mut nobody);
     let fit = match Course::new(&site, &pulse)? {
-        Some(course) => course.first_fit(&pulse),
+        Some(mut course) => course.first_fit(&pulse),
         None => None,
     };
     let fit = fit.unwrap_or_else(|| bare(&site).fit);
-    let weights = vec![1.0; site.set.seams.len()];
-    let SeamProblem { assembly, problem } = SeamProblem::new(site.seams(&weights), &fit)?;
+    let weights = Weights::even(&site.set);
+    let SeamProblem { assembly, problem } = SeamProblem::new(site.seams(&weights, false), &fit)?;
     Ok((problem, assembly.start()))
 }
 
@@ -177,7 +178,8 @@ fn run(
     let has_bounds = site.bounds().is_some();
     let status = if is_done { ending(&found, has_bounds, &site) } else { Status::Interrupted };
     let report = report(&site, &found, status);
-    let worst_excess = has_bounds.then_some(found.excess);
+    let worst_excess = has_bounds.then_some(found.excess.worst());
+    let max_deviation = site.bounds().and_then(|b| b.max_deviation).map(|d| d * panels.size);
     drop(site);
     let result = Paneling::new(&panels, found);
     let grid = grid.map(|grid| Paneling::new(&panels, grid));
@@ -187,8 +189,11 @@ fn run(
     };
     let metrics = Metrics {
         quality: Quality::new(&panels, &result),
-        cost: result.cost(&input.prices),
+        cost: result.cost(&panels, &input.prices),
+        blank_area: result.blanks(&panels).iter().sum(),
+        panel_area: (0..panels.len()).map(|p| panels.area(p)).sum(),
         worst_excess,
+        max_deviation,
         grid: of_grid.map(|grid| Quality::new(&panels, grid)),
     };
     // Measured where rounding is small, then moved to where the design stands.
@@ -200,7 +205,7 @@ fn run(
 /// How a run that was not interrupted ended.
 fn ending(found: &Found, has_bounds: bool, site: &Site<'_>) -> Status {
     if has_bounds {
-        return if found.excess <= 1.0 { Status::Converged } else { Status::Infeasible };
+        return if found.excess.is_within() { Status::Converged } else { Status::Infeasible };
     }
     let (history, stall, end) = if found.seam_history.is_empty() {
         (&found.fit_history, alternation::STALL, Status::IterationLimit)

@@ -134,7 +134,7 @@ proptest! {
         mold in 0.0..100.0_f64,
         panel in 0.0..10.0_f64,
     ) {
-        let prices = PriceList::new([(MoldType::Cubic, Price { mold, panel })]);
+        let prices = PriceList::new([(MoldType::Cubic, Price { mold, panel, area: 0.0 })]);
         let solution = solved(Input::from(&surface).with_prices(prices), &options(4));
         prop_assert!(is_near(solution.metrics.cost, 4.0 * mold + 16.0 * panel, 1e-14));
     }
@@ -142,7 +142,7 @@ proptest! {
     #[test]
     fn converged_means_within_the_bounds(surface in surfaces(), degrees in 0.2..8.0_f64) {
         let options =
-            Options { max_kink_deg: Some(degrees), molds: None, ..options(1) };
+            Options { max_kink_deg: Some(degrees), molds: None, max_deviation: Some(9.0), ..options(1) };
         let solution = solved(&surface, &options);
         let excess = solution.metrics.worst_excess.unwrap();
         let largest = solution.metrics.quality.kink_max_deg;

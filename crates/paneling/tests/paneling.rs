@@ -271,7 +271,7 @@ fn bounds_are_kept_or_called_unmet() {
     let options = Options { max_gap: Some(-1.0), ..Options::default() };
     let error = solve(&set, &options, &mut ()).unwrap_err();
     assert_eq!(error, Error::BadOption { name: "max_gap", value: -1.0 });
-    let planes = PriceList::new([(MoldType::Plane, Price { mold: 1.0, panel: 1.0 })]);
+    let planes = PriceList::new([(MoldType::Plane, Price { mold: 1.0, panel: 1.0, area: 0.0 })]);
     let input = paneling::Input::from(&set).with_prices(planes);
     let error = solve(input, &Options::default(), &mut ()).unwrap_err();
     assert_eq!(error, Error::NoPrice { kind: "cubic" });

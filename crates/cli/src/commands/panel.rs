@@ -4,18 +4,24 @@ use crate::args::{ConfigArgs, EndingArgs, ReportArgs, check_output_path};
 use crate::checkpoints::CheckpointArgs;
 use crate::context::Context;
 use crate::failure::Failure;
-use crate::input_file::{SurfaceArgs, read_surface};
+use crate::input_file::{SurfaceArgs, read_other_surface, read_surface};
 use crate::option_flags::{OptionFlags, list, refused};
 use crate::outcome::{Outcome, Status};
 use crate::panel_files::{PANEL_OUTPUTS, encode};
 use crate::report_support;
 use crate::report_support::panels::paneling_report;
+use crate::trade_offs::{DEGREES, TradeOffs};
 use crate::watch::Watch;
 use bspline::BsplineSurface;
 use exchange::LengthUnit;
-use gp_solver::SolverError;
-use paneling::{Error, Input, Layout, MoldType, Options, Paneling, PriceList, Solution, solve};
+use gp_solver::{Counts, SolverError};
+use paneling::{
+    Error, Input, Layout, MoldType, Options, Paneling, PriceList, Solution, solve, trade_off,
+};
 use std::path::{Path, PathBuf};
+
+/// Control nets a surface is optimised at for a trade-off, one after the other.
+pub(super) const WEINGARTEN_LEVELS: [(usize, usize); 4] = [(10, 8), (14, 10), (18, 14), (25, 18)];
 
 /// Arguments of `panel`.
 #[derive(Debug, clap::Args)]
@@ -30,8 +36,12 @@ pub(crate) struct Panel {
     /// Where to write (repeatable): panels as glb or obj, molds as step, both as 3dm with a layer
     /// per mold, a table of the panels as csv or ron, flat outlines of panels on planar and
     /// cylindrical molds as svg or dxf
-    #[arg(short, long = "output", value_name = "FILE", required = true)]
+    #[arg(short, long = "output", value_name = "FILE", required_unless_present = "trade_off")]
     output: Vec<PathBuf>,
+    /// Molds and cost for kinks of 1 to 0.05 degrees, of the surface and of its Weingarten version
+    /// (or of the surface in AFTER); -o takes the table as csv
+    #[arg(long, value_name = "AFTER", num_args = 0..=1, require_equals = true)]
+    trade_off: Option<Option<PathBuf>>,
     #[command(flatten)]
     options: OptionFlags<Options>,
     /// Prices of molds and panels by type (RON)
@@ -94,6 +104,10 @@ impl Panel {
         if let Some(layout) = &layout {
             input = input.with_layout(layout);
         }
+        if let Some(after) = &self.trade_off {
+            let sides = (&named.surface, after.as_deref());
+            return self.trade_off(context, sides, &input, &options, &unit, watch);
+        }
         context.afford(input.cost(&options), "panels")?;
         let solution = solve(input, &options, &mut watch).map_err(|e| match (e, &self.prices) {
             (Error::Solver(e @ SolverError::ForeignCheckpoint { .. }), _) => watch.foreign(&e),
@@ -134,6 +148,46 @@ impl Panel {
         Ok(outcome)
     }
 
+    /// Molds and cost against tolerance, before and after.
+    fn trade_off(
+        &self,
+        context: &Context,
+        (before, after): (&BsplineSurface, Option<&Path>),
+        input: &Input<'_>,
+        options: &Options,
+        unit: &LengthUnit,
+        mut watch: Watch<'_>,
+    ) -> Result<Outcome, Failure> {
+        if let Some(path) = self.output.iter().find(|p| exchange::extension_of(p) != "csv") {
+            return Err(Failure::input(path, "the table of a trade-off is written as csv"));
+        }
+        context.afford(input.cost(options), "panels")?;
+        let after = match after {
+            Some(path) => read_other_surface(path)?,
+            None => {
+                let levels = WEINGARTEN_LEVELS.map(|(u, v)| Counts { u, v }).to_vec().into();
+                let options = weingarten::Options { levels, ..Default::default() };
+                let solution = weingarten::solve(before, &options, &mut watch);
+                solution.map_err(|e| refused::<weingarten::Options>(&self.input, e))?.result
+            }
+        };
+        let options = Options { compare_grid: false, ..options.clone() };
+        let failed = |e| refused::<Options>(&self.input, e);
+        let first = trade_off(input.clone(), &options, &DEGREES, &mut watch).map_err(failed)?;
+        let other = input.clone().with_surface(&after);
+        let second = trade_off(other, &options, &DEGREES, &mut watch).map_err(failed)?;
+        let is_whole = second.len() == DEGREES.len();
+        let status = if is_whole { Status::Converged } else { Status::Interrupted };
+        let table = TradeOffs::new([before, &after], [first, second]);
+        let mut outcome = Outcome::new(status, 0).with_input(&self.input).with_metrics(&table)?;
+        outcome.summary = table.summary(unit);
+        if watch.finish(&mut outcome) {
+            let files = self.output.iter().map(|p| (p.clone(), table.csv(unit).into_bytes()));
+            outcome.files.extend(files);
+        }
+        Ok(outcome)
+    }
+
     fn check_outputs(&self) -> Result<(), Failure> {
         for (k, path) in self.output.iter().enumerate() {
             if self.output[..k].contains(path) {
@@ -166,6 +220,14 @@ fn not_unrolled(paneling: &Paneling, path: &Path) -> Option<String> {
     })
 }
 
+/// The bound on the distance from the design, if there is one.
+fn allowed(solution: &Solution, unit: &LengthUnit) -> String {
+    solution.metrics.max_deviation.map_or_else(String::new, |most| {
+        let percent = 100.0 * most / solution.panels.extent();
+        format!(", {percent:.3} % allowed ({most:.3} {unit})")
+    })
+}
+
 fn summary(solution: &Solution, unit: &LengthUnit) -> Vec<String> {
     let (paneling, metrics) = (&solution.result, &solution.metrics);
     let quality = &metrics.quality;
@@ -179,7 +241,11 @@ fn summary(solution: &Solution, unit: &LengthUnit) -> Vec<String> {
             "  gaps: median {:.3e}, 95 % below {:.3e}, largest {:.3e} {unit}",
             quality.gap_median, quality.gap_p95, quality.gap_max
         ),
-        format!("  design met within {:.5} % of the size", quality.deviation_max_percent),
+        format!(
+            "  design met within {:.5} % of the size{}",
+            quality.deviation_max_percent,
+            allowed(solution, unit)
+        ),
     ];
     let counts = MoldType::ALL.map(|t| (t, paneling.molds.iter().filter(|m| m.kind == t).count()));
     let used: Vec<String> = counts
@@ -191,7 +257,7 @@ fn summary(solution: &Solution, unit: &LengthUnit) -> Vec<String> {
     if solution.report.status == Status::Infeasible {
         let excess = metrics.worst_excess.unwrap_or(f64::INFINITY);
         lines.push(format!(
-            "  the bounds are not met: the worst seam is {excess:.2} times beyond them"
+            "  the bounds are not met: the worst seam or panel is {excess:.2} times beyond them"
         ));
     }
     for s in paneling.measures.worst_kinks(3) {

@@ -247,6 +247,8 @@ fn power(key: &str) -> Option<i32> {
         "area" => 2,
         "sampling_error_max" | "circle_defect_max" => 1,
         "tolerance" | "torus_fit_rms" | "fitted_deviation_max" => 1,
+        "blank_area" | "panel_area" => 2,
+        "max_deviation" => 1,
         _ if key.starts_with("gap_") || key.starts_with("distance_") => 1,
         _ if key.starts_with("gaussian_curvature") => -2,
         _ if key.starts_with("mean_curvature") || key.starts_with("principal_curvature") => -1,

@@ -79,7 +79,7 @@ fn the_page_of_the_demo_is_small_and_repeats() {
         "Worst seams of panels after",
         "stage-3",
         "diagram_area",
-        "panels_before_cost_driven",
+        "panels_before",
         "<th scope=\"row\">kink_median_deg</th>",
     ];
     for part in parts {

@@ -24,6 +24,8 @@ const ROWS: usize = 3;
 pub struct DesignRows {
     assembly: Arc<Assembly>,
     slope_weight: f64,
+    /// Square roots of the panels' weights.
+    roots: Vec<f64>,
     elements: Elements,
 }
 
@@ -37,8 +39,25 @@ impl DesignRows {
             assembly.columns(&[p], &mut columns);
             elements.push(&columns, ROWS * assembly.panels.panel_samples(p).0.len());
         }
-        Self { assembly, slope_weight, elements }
+        let roots = vec![1.0; assembly.panels.len()];
+        Self { assembly, slope_weight, roots, elements }
     }
+
+    /// With a factor for the squares of every panel's residuals.
+    ///
+    /// # Panics
+    /// If there is not one weight per panel.
+    #[must_use]
+    pub fn with_weights(mut self, weights: &[f64]) -> Self {
+        self.roots = roots_of(&self.assembly, weights);
+        self
+    }
+}
+
+/// Square roots of one weight per panel.
+fn roots_of(assembly: &Assembly, weights: &[f64]) -> Vec<f64> {
+    assert_eq!(weights.len(), assembly.panels.len(), "one weight per panel");
+    weights.iter().map(|w| w.sqrt()).collect()
 }
 
 impl ResidualBlock for DesignRows {
@@ -59,7 +78,8 @@ impl ResidualBlock for DesignRows {
             let rows = residuals[self.elements.rows(p)].as_chunks_mut::<ROWS>().0;
             for ((out, point), normal) in rows.iter_mut().zip(points).zip(normals) {
                 let local = to_local * (*point - pose.origin);
-                *out = sample_residual(&mold, self.slope_weight, local, to_local * *normal);
+                let r = sample_residual(&mold, self.slope_weight, local, to_local * *normal);
+                *out = r.map(|r| self.roots[p] * r);
             }
         }
     }
@@ -78,10 +98,11 @@ impl ResidualBlock for DesignRows {
                 let local = to_local * (*point - pose.origin);
                 let (r, pose_rows) = sample_pose_rows(&mold, w, local, to_local * *normal);
                 let mold_rows = sample_mold_rows(&mold, w, local);
-                *out = r;
+                *out = r.map(|r| self.roots[p] * r);
                 for (k, row) in rows.chunks_exact_mut(width).enumerate() {
                     row[..POSE].copy_from_slice(&assembly.row_from_here(x, p, &pose_rows[k]));
                     row[POSE..].copy_from_slice(&mold_rows[k][..width - POSE]);
+                    row.iter_mut().for_each(|v| *v *= self.roots[p]);
                 }
             }
         }
@@ -96,6 +117,8 @@ impl ResidualBlock for DesignRows {
 #[derive(Clone, Debug)]
 pub struct ReachRows {
     assembly: Arc<Assembly>,
+    /// Square roots of the panels' weights.
+    roots: Vec<f64>,
     elements: Elements,
 }
 
@@ -109,14 +132,26 @@ impl ReachRows {
             assembly.columns(&[p], &mut columns);
             elements.push(&columns[..POSE], 1);
         }
-        Self { assembly, elements }
+        let roots = vec![1.0; assembly.panels.len()];
+        Self { assembly, roots, elements }
+    }
+
+    /// With a factor for the square of every panel's residual.
+    ///
+    /// # Panics
+    /// If there is not one weight per panel.
+    #[must_use]
+    pub fn with_weights(mut self, weights: &[f64]) -> Self {
+        self.roots = roots_of(&self.assembly, weights);
+        self
     }
 
     fn row(&self, x: &[f64], p: usize) -> (f64, [f64; POSE]) {
-        let assembly = &self.assembly;
+        let (assembly, root) = (&self.assembly, self.roots[p]);
         let points = assembly.panels.panel_samples(p).0;
         let middle = assembly.pose(x, p).to_local(points[points.len() - 1]);
-        reach(&assembly.mold(x, assembly.labels[p]), middle).unwrap_or((0.0, [0.0; POSE]))
+        let paid = reach(&assembly.mold(x, assembly.labels[p]), middle);
+        paid.map_or((0.0, [0.0; POSE]), |(r, row)| (root * r, row.map(|v| root * v)))
     }
 }
 

@@ -36,6 +36,12 @@ impl Alternation {
         Self { damping: vec![Some(FIRST_DAMPING); molds], rounds: 0, energy: None }
     }
 
+    /// Rounds in which only some molds move, together with their panels.
+    pub(crate) fn of_some(moves: &[bool]) -> Self {
+        let damping = moves.iter().map(|moves| moves.then_some(FIRST_DAMPING)).collect();
+        Self { damping, rounds: ALTERNATING, energy: None }
+    }
+
     /// One round. The first alternates between molds and poses and tries both half turns of every
     /// panel, the others move every mold together with its panels; the energy never rises. Returns
     /// whether another round is worth while, `None` if asked to stop.

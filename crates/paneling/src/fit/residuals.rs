@@ -127,18 +127,25 @@ pub(crate) struct SeamSide {
     pub(crate) rows: [[f64; SIDE]; 3],
 }
 
+/// A step along the line this much smaller than the first is the last: the next would be smaller by
+/// the square.
+const FOOT_STEP: f64 = 1e-7;
+
 /// Where the line through a design point along its normal meets the mold, and the mold's unit
 /// normal there: offset along the line and normal in local coordinates.
 pub(crate) fn foot(mold: &Mold, local: DVec3, normal: DVec3) -> (f64, DVec3) {
     let mut t = 0.0;
     let mut z = mold.at(local.x, local.y);
     // The mold is nearly parallel to the design there, so each step squares the error.
-    for _ in 0..4 {
+    let mut least = 0.0;
+    for k in 0..4 {
         let q = local + t * normal;
         z = mold.at(q.x, q.y);
         let step = (q.z - z.f) / (normal.z - z.fx * normal.x - z.fy * normal.y);
         t -= step;
-        if step.abs() <= 1e-15 {
+        if k == 0 {
+            least = FOOT_STEP * step.abs();
+        } else if step.abs() <= least {
             break;
         }
     }

@@ -306,6 +306,49 @@ impl PanelSet {
         &self.samples.points[start..start + self.border_counts[panel]]
     }
 
+    /// Area of the polygon through the samples of a panel's border, seen along the normal at its
+    /// middle.
+    #[must_use]
+    pub fn area(&self, panel: usize) -> f64 {
+        let border = self.border(panel);
+        let middle = self.frames[panel].origin;
+        let next = border.iter().cycle().skip(1);
+        let sum = |(a, b): (&DVec3, &DVec3)| (*a - middle).cross(*b - middle);
+        0.5 * border.iter().zip(next).map(sum).sum::<DVec3>().length()
+    }
+
+    /// Length and breadth of a panel: of the smallest rectangle around its border with a side along
+    /// one of the chords of its sides, seen along the normal at its middle.
+    #[must_use]
+    pub fn breadths(&self, panel: usize) -> [f64; 2] {
+        let border = self.border(panel);
+        let Pose { origin, rotation } = &self.frames[panel];
+        let flat: Vec<_> = border
+            .iter()
+            .map(|x| {
+                let d = *x - *origin;
+                [d.dot(rotation.x_axis), d.dot(rotation.y_axis)]
+            })
+            .collect();
+        let per_side = SEAM_SAMPLES - 1;
+        let rectangle = |side: usize| {
+            let (a, b) = (flat[per_side * side], flat[per_side * (side + 1) % flat.len()]);
+            let (x, y) = (b[0] - a[0], b[1] - a[1]);
+            let length = x.hypot(y);
+            let range = |of: &dyn Fn(&[f64; 2]) -> f64| {
+                let values = flat.iter().map(of);
+                let start = [f64::INFINITY, f64::NEG_INFINITY];
+                let [low, high] = values.fold(start, |[l, h], v| [l.min(v), h.max(v)]);
+                (high - low) / length
+            };
+            let along = range(&|p| p[0] * x + p[1] * y);
+            let across = range(&|p| p[1] * x - p[0] * y);
+            [along.max(across), along.min(across)]
+        };
+        let smaller = |a: [f64; 2], b: [f64; 2]| if b[0] * b[1] < a[0] * a[1] { b } else { a };
+        (0..flat.len() / per_side).map(rectangle).reduce(smaller).unwrap_or([0.0; 2])
+    }
+
     /// The points of the design a seam is measured at.
     #[must_use]
     pub fn seam_points(&self, seam: &Seam) -> &[DVec3] {

@@ -6,16 +6,21 @@ use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
 /// Price of one type of mold and of a panel made on it, in any currency.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Price {
     /// Making the mold.
     pub mold: f64,
     /// Making one panel on it.
     pub panel: f64,
+    /// A unit of area of the mold: of the rectangle around its panels, in units of the model.
+    #[serde(default)]
+    pub area: f64,
 }
 
-/// Prices by type of mold (Eigensatz et al. 2010, Sec. 3: a mold is paid once, a panel each time).
+/// Prices by type of mold (Eigensatz et al. 2010, Sec. 3: a mold is paid once, a panel each time):
+///
+/// `cost = Σ over molds (mold + area · blank area + panels · panel)`
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(transparent)]
 pub struct PriceList {
@@ -32,7 +37,7 @@ impl PriceList {
     /// Every mold costs 1 and panels nothing: the total cost is the number of molds.
     #[must_use]
     pub fn counting_molds() -> Self {
-        let price = Price { mold: 1.0, panel: 0.0 };
+        let price = Price { mold: 1.0, ..Price::default() };
         Self::new(MoldType::ALL.map(|kind| (kind, price)))
     }
 
@@ -45,7 +50,7 @@ impl PriceList {
             return Err(Error::NoPrice { kind: kind.name() });
         }
         for (kind, price) in &self.prices {
-            for value in [price.mold, price.panel] {
+            for value in [price.mold, price.panel, price.area] {
                 if !(value >= 0.0 && value.is_finite()) {
                     return Err(Error::BadPrice { kind: kind.name(), value });
                 }
@@ -54,10 +59,12 @@ impl PriceList {
         Ok(())
     }
 
-    /// Cost of one mold of a type and `panels` panels on it; infinite for a type without price.
+    /// Cost of one mold of a type with a blank of this area, and of `panels` panels on it; infinite
+    /// for a type without price.
     #[must_use]
-    pub fn cost(&self, kind: MoldType, panels: usize) -> f64 {
-        self.prices.get(&kind).map_or(f64::INFINITY, |p| p.mold + panels as f64 * p.panel)
+    pub fn cost(&self, kind: MoldType, panels: usize, area: f64) -> f64 {
+        let of = |p: &Price| p.mold + p.area * area + panels as f64 * p.panel;
+        self.prices.get(&kind).map_or(f64::INFINITY, of)
     }
 }
 
@@ -68,9 +75,9 @@ mod tests {
     #[test]
     fn prices_are_checked_by_type() {
         let mut list = PriceList::counting_molds();
-        assert_eq!(list.cost(MoldType::Cubic, 10), 1.0);
+        assert_eq!(list.cost(MoldType::Cubic, 10, 5.0), 1.0);
         list.check(&MoldType::ALL).unwrap();
-        list.prices.insert(MoldType::Plane, Price { mold: f64::NAN, panel: 0.0 });
+        list.prices.insert(MoldType::Plane, Price { mold: f64::NAN, ..Price::default() });
         list.prices.remove(&MoldType::Torus);
         assert!(matches!(
             list.check(&[MoldType::Plane]),

@@ -1,7 +1,9 @@
 //! Mold shapes: height functions over the tangent plane of a mold's own frame.
 
+pub(crate) use crate::mold::height::{Height, MAX_PARAMETERS, ParameterRows};
+use crate::mold::round::{Torus, round_at, round_rows};
+use glam::DVec3;
 use gp_solver::{ListItem, OptionValue, choices};
-use numerics::Taylor;
 use serde::{Deserialize, Serialize};
 
 /// The kinds of molds, from the simplest to the most general.
@@ -80,9 +82,6 @@ impl std::str::FromStr for MoldType {
     }
 }
 
-/// Most parameters a mold can have.
-pub(crate) const MAX_PARAMETERS: usize = 7;
-
 /// A mold: the surface `z = f(x, y)` in its own frame, which touches the plane `z = 0` at the
 /// origin.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -98,33 +97,14 @@ pub struct Mold {
     pub parameters: [f64; MAX_PARAMETERS],
 }
 
-/// A height function and its derivatives at one point.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub(crate) struct Height {
-    pub(crate) f: f64,
-    pub(crate) fx: f64,
-    pub(crate) fy: f64,
-    pub(crate) fxx: f64,
-    pub(crate) fxy: f64,
-    pub(crate) fyy: f64,
+/// Area of the rectangle around points in the frame of a mold: what its blank has to have. 0 if
+/// there are none.
+pub(crate) fn blank(points: impl Iterator<Item = DVec3>) -> f64 {
+    let start = (DVec3::INFINITY, DVec3::NEG_INFINITY);
+    let (low, high) = points.fold(start, |(low, high), x| (low.min(x), high.max(x)));
+    let size = (high - low).max(DVec3::ZERO);
+    size.x * size.y
 }
-
-impl Height {
-    /// From a Taylor expansion whose first two variables are x and y.
-    fn of<const N: usize>(z: Taylor<N>) -> Self {
-        Self {
-            f: z.value,
-            fx: z.first[0],
-            fy: z.first[1],
-            fxx: z.second[0][0],
-            fxy: z.second[0][1],
-            fyy: z.second[1][1],
-        }
-    }
-}
-
-/// Derivatives of `f, f_x, f_y` in the parameters of the mold.
-pub(crate) type ParameterRows = [[f64; MAX_PARAMETERS]; 3];
 
 impl Mold {
     /// A flat mold of this kind.
@@ -180,23 +160,11 @@ impl Mold {
                     fyy: 2.0 * c + 2.0 * g * x + 6.0 * h * y,
                 }
             }
-            MoldType::Torus | MoldType::Cylinder | MoldType::Sphere => self.round_at(x, y),
+            MoldType::Cylinder | MoldType::Sphere => {
+                round_at(p[0], self.kind == MoldType::Sphere, x, y)
+            }
+            MoldType::Torus => self.torus().at(x, y),
         }
-    }
-
-    // Apart, so that the polynomials do not pay for its large stack frame.
-    #[inline(never)]
-    fn round_at(&self, x: f64, y: f64) -> Height {
-        if self.kind != MoldType::Torus {
-            let [k1, k2] = self.round_curvatures().map(Taylor::constant);
-            let [x, y] = Taylor::variables([x, y]);
-            return Height::of::<2>(round_height(x, y, k1, k2));
-        }
-        self.torus_height(x, y).map_or(UNREACHED, |z| {
-            let [k1, k2, g, ..] = self.parameters.map(Taylor::constant);
-            let [x, y, z] = Taylor::variables([x, y, z]);
-            Height::of(explicit::<3, 2>(z.value, torus_equation(x, y, [k1, k2, g], z)))
-        })
     }
 
     /// Derivatives of `f, f_x, f_y` in the parameters at `(x, y)`.
@@ -215,154 +183,19 @@ impl Mold {
                 rows[1] = [2.0 * x, y, 0.0, 3.0 * xx, 2.0 * xy, yy, 0.0];
                 rows[2] = [0.0, x, 2.0 * y, 0.0, xx, 2.0 * xy, 3.0 * yy];
             }
-            MoldType::Torus | MoldType::Cylinder | MoldType::Sphere => {
-                return self.round_rows(x, y);
+            MoldType::Cylinder | MoldType::Sphere => {
+                return round_rows(self.parameters[0], self.kind == MoldType::Sphere, x, y);
             }
+            MoldType::Torus => return self.torus().rows(x, y),
         }
         rows
     }
 
-    #[inline(never)]
-    fn round_rows(&self, x: f64, y: f64) -> ParameterRows {
-        let mut rows = [[0.0; MAX_PARAMETERS]; 3];
-        if self.kind == MoldType::Torus {
-            match self.torus_rows(x, y) {
-                Some(z) => {
-                    for i in 0..3 {
-                        rows[0][i] = z.first[2 + i];
-                        rows[1][i] = z.second[0][2 + i];
-                        rows[2][i] = z.second[1][2 + i];
-                    }
-                }
-                None => rows.iter_mut().for_each(|row| row[..3].fill(f64::NAN)),
-            }
-            return rows;
-        }
-        let [k1, k2] = self.round_curvatures();
-        let [x, y, k1, k2] = Taylor::variables([x, y, k1, k2]);
-        let z = round_height(x, y, k1, k2);
-        for (row, [along_x, along_y]) in rows.iter_mut().zip([
-            [z.first[2], z.first[3]],
-            [z.second[0][2], z.second[0][3]],
-            [z.second[1][2], z.second[1][3]],
-        ]) {
-            let is_sphere = self.kind == MoldType::Sphere;
-            row[0] = if is_sphere { along_x + along_y } else { along_x };
-        }
-        rows
-    }
-
-    /// Curvatures of a cylinder or sphere along x and y.
-    fn round_curvatures(&self) -> [f64; 2] {
-        let k = self.parameters[0];
-        [k, if self.kind == MoldType::Sphere { k } else { 0.0 }]
-    }
-
-    /// The height of a torus; `None` beyond its reach.
-    ///
-    /// Turning `(x, y, z)` about the axis into the plane `x = 0` gives `(y + g d, z + k₁ d)` with
-    /// `d = −x² / (1 − σ + √((k₁² + g²) x² + (1 − σ)²))` and `σ = g y + k₁ z`, which stays exact as
-    /// the axis moves to infinity. There the generating circle has the height
-    /// `p(t) = k₂ t² / (1 + √(1 − k₂² t²))`, so the height is the root of
-    /// `z + k₁ d − p(y + g d)`.
-    fn torus_height(&self, x: f64, y: f64) -> Option<f64> {
+    fn torus(&self) -> Torus {
         let [k1, k2, g, ..] = self.parameters;
-        let squared = k1 * k1 + g * g;
-        let mut z = 0.5 * (k1 * x * x + k2 * y * y);
-        let scale = x.abs() + y.abs() + z.abs();
-        let mut is_root = false;
-        for _ in 0..30 {
-            let below = 1.0 - g * y - k1 * z;
-            let w = (squared * x * x + below * below).sqrt();
-            let (sum, along_w) = (below + w, -k1 * below / w);
-            let d = -x * x / sum;
-            let d_z = d * (k1 - along_w) / sum;
-            let t = y + g * d;
-            let root = (1.0 - k2 * k2 * t * t).sqrt();
-            let value = z + k1 * d - k2 * t * t / (1.0 + root);
-            let slope = 1.0 + k1 * d_z - k2 * t / root * g * d_z;
-            // Beyond the axis or where the tube has turned over there is no height; NaN as well.
-            if !(below > 0.0 && slope > 0.0) {
-                return None;
-            }
-            let step = value / slope;
-            z -= step;
-            if is_root {
-                break;
-            }
-            // The step after a small one only removes rounding.
-            is_root = step.abs() <= 1e-9 * scale;
-        }
-        is_root.then_some(z)
-    }
-
-    /// The torus height as a function of x, y and the three parameters `k₁, k₂, g`.
-    fn torus_rows(&self, x: f64, y: f64) -> Option<Taylor<5>> {
-        let z = self.torus_height(x, y)?;
-        let [k1, k2, g, ..] = self.parameters;
-        let [x, y, k1, k2, g, z] = Taylor::variables([x, y, k1, k2, g, z]);
-        Some(explicit(z.value, torus_equation(x, y, [k1, k2, g], z)))
+        Torus { k1, k2, g }
     }
 }
-
-/// The height of a cylinder or sphere as a function of x, y and two curvatures, which are those
-/// of the parallel and of the generating circle of a torus at its equator.
-///
-/// The generating circle has the height `p = k₂ y² / (1 + √(1 − k₂² y²))`; turning it about
-/// the axis at height `1/k₁` gives `z = q / (1 + √(1 − k₁ q))` with
-/// `q = 2 p + k₁ (x² − p²)`, which stays exact where a curvature vanishes (a cylinder) and is
-/// a sphere for equal curvatures.
-fn round_height<const N: usize>(
-    x: Taylor<N>,
-    y: Taylor<N>,
-    k1: Taylor<N>,
-    k2: Taylor<N>,
-) -> Taylor<N> {
-    let one = Taylor::constant(1.0);
-    let p = k2 * y * y / (one + (one - k2 * k2 * y * y).sqrt());
-    let q = p + p + k1 * (x * x - p * p);
-    q / (one + (one - k1 * q).sqrt())
-}
-
-/// What vanishes on the torus, see [`Mold::torus_height`].
-fn torus_equation<const N: usize>(
-    x: Taylor<N>,
-    y: Taylor<N>,
-    [k1, k2, g]: [Taylor<N>; 3],
-    z: Taylor<N>,
-) -> Taylor<N> {
-    let one = Taylor::constant(1.0);
-    let below = one - g * y - k1 * z;
-    let xx = x * x;
-    let w = (xx * (k1 * k1 + g * g) + below * below).sqrt();
-    let d = Taylor::constant(0.0) - xx / (below + w);
-    let t = y + g * d;
-    let tube = k2 * t;
-    let p = tube * t / (one + (one - tube * tube).sqrt());
-    z + k1 * d - p
-}
-
-/// The last variable of an equation, of value `z`, as a function of the `M = N − 1` others, by
-/// implicit differentiation.
-fn explicit<const N: usize, const M: usize>(z: f64, equation: Taylor<N>) -> Taylor<M> {
-    let (first, second) = (equation.first, equation.second);
-    let mut height = Taylor::<M>::constant(z);
-    for i in 0..M {
-        height.first[i] = -first[i] / first[M];
-    }
-    for i in 0..M {
-        for j in 0..M {
-            let (fi, fj) = (height.first[i], height.first[j]);
-            let sum = second[i][j] + second[i][M] * fj + second[M][j] * fi + second[M][M] * fi * fj;
-            height.second[i][j] = -sum / first[M];
-        }
-    }
-    height
-}
-
-/// Beyond the reach of a round mold.
-const UNREACHED: Height =
-    Height { f: f64::NAN, fx: f64::NAN, fy: f64::NAN, fxx: f64::NAN, fxy: f64::NAN, fyy: f64::NAN };
 
 #[cfg(test)]
 mod tests {

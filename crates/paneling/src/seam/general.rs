@@ -19,12 +19,14 @@ impl SeamProblem {
         let Seams { set, options, weights, .. } = seams;
         let assembly = Arc::new(Assembly::new(set, &fit.molds, &fit.labels, &fit.poses));
         let mut problem = Problem::new(assembly.variables());
-        let gaps = problem.add(GapRows::new(Arc::clone(&assembly), weights));
+        let gaps = problem.add(GapRows::new(Arc::clone(&assembly), &weights.seams));
         problem.set_weight(gaps, options.gap_weight)?;
-        problem.add(KinkRows::new(Arc::clone(&assembly), weights));
-        let design = problem.add(DesignRows::new(Arc::clone(&assembly), fit.slope_weight));
+        problem.add(KinkRows::new(Arc::clone(&assembly), &weights.seams));
+        let design = DesignRows::new(Arc::clone(&assembly), fit.slope_weight);
+        let design = problem.add(design.with_weights(&weights.panels));
         problem.set_weight(design, options.design_weight)?;
-        let reach = problem.add(ReachRows::new(Arc::clone(&assembly)));
+        let reach = ReachRows::new(Arc::clone(&assembly)).with_weights(&weights.panels);
+        let reach = problem.add(reach);
         problem.set_weight(reach, options.design_weight)?;
         Ok(Self { assembly, problem })
     }
@@ -83,7 +85,7 @@ mod tests {
     use crate::pulse::Pulse;
     use crate::seam::step::SeamRun;
     use crate::seam::system::System as MatrixFree;
-    use crate::seam::unknowns::SeamOptions;
+    use crate::seam::unknowns::{SeamOptions, Weights};
     use crate::{Layout, MoldType, PanelSet, Pattern};
     use geom_core::assert_close;
     use gp_solver::Factorization;
@@ -96,8 +98,12 @@ mod tests {
         let set = set.scaled(1.0 / set.size);
         let mut nobody = ();
         let pulse = &Pulse::new(&mut nobody);
-        let weights: Vec<f64> = (0..set.seams.len()).map(|s| 1.0 + (s % 3) as f64).collect();
-        let options = SeamOptions { steps: 1, gap_weight: 1.3, design_weight: 0.2, stall: 0.03 };
+        let weights = Weights {
+            seams: (0..set.seams.len()).map(|s| 1.0 + (s % 3) as f64).collect(),
+            panels: (0..set.len()).map(|p| 1.0 + (p % 5) as f64).collect(),
+        };
+        let options =
+            SeamOptions { steps: 1, gap_weight: 1.3, design_weight: 0.2, stall: 0.03, hinge: None };
         let incident = set.incident_seams();
         let seams = Seams { set: &set, options: &options, weights: &weights, incident: &incident };
         for kind in MoldType::ALL {

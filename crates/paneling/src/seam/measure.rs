@@ -142,8 +142,8 @@ pub(crate) fn measure(
                     let (t, m) = foot(&molds[labels[p]], local, to_local * normals[k]);
                     (t, poses[p].rotation * m)
                 });
-                measure.gaps[k] = (a.0 - b.0).abs();
-                measure.kinks[k] = a.1.cross(b.1).length().atan2(a.1.dot(b.1));
+                measure.gaps[k] = reached((a.0 - b.0).abs());
+                measure.kinks[k] = reached(a.1.cross(b.1).length().atan2(a.1.dot(b.1)));
             }
             measure
         })
@@ -156,7 +156,7 @@ pub(crate) fn measure(
             let to_local = poses[p].rotation.transpose();
             let offset = |(x, n): (&glam::DVec3, &glam::DVec3)| {
                 let local = to_local * (*x - poses[p].origin);
-                foot(&molds[labels[p]], local, to_local * *n).0.abs()
+                reached(foot(&molds[labels[p]], local, to_local * *n).0.abs())
             };
             let all = points.iter().zip(normals).map(offset);
             all.fold([0.0, 0.0, 0.0], |[most, squares, count]: [f64; 3], t| {
@@ -172,20 +172,29 @@ pub(crate) fn measure(
     Measures { seams, kinks, gaps, deviations, deviation_rms }
 }
 
-/// Largest angle to the design and largest offset from it along the border of a panel.
-pub(crate) fn own_deviation(set: &PanelSet, mold: &Mold, pose: &Pose, p: usize) -> [f64; 2] {
+/// Largest angle to the design and largest offset from it along the border of a panel, and the
+/// largest offset anywhere.
+pub(crate) fn own_deviation(set: &PanelSet, mold: &Mold, pose: &Pose, p: usize) -> [f64; 3] {
     let (points, normals) = set.panel_samples(p);
     let to_local = pose.rotation.transpose();
-    let mut worst = [0.0_f64; 2];
-    for (x, n) in points.iter().zip(normals).take(set.border(p).len()) {
+    let border = set.border(p).len();
+    let mut worst = [0.0_f64; 3];
+    for (k, (x, n)) in points.iter().zip(normals).enumerate() {
         let n = to_local * *n;
         let (t, m) = foot(mold, to_local * (*x - pose.origin), n);
-        // NaN, beyond the reach of a round mold, counts as infinitely bad.
-        let kink = m.cross(n).length().atan2(m.dot(n));
-        worst[0] = if kink.is_nan() { f64::INFINITY } else { worst[0].max(kink) };
-        worst[1] = if t.is_nan() { f64::INFINITY } else { worst[1].max(t.abs()) };
+        let offset = reached(t.abs());
+        worst[2] = worst[2].max(offset);
+        if k < border {
+            worst[0] = worst[0].max(reached(m.cross(n).length().atan2(m.dot(n))));
+            worst[1] = worst[1].max(offset);
+        }
     }
     worst
+}
+
+/// NaN, beyond the reach of a round mold, counts as infinitely bad.
+fn reached(value: f64) -> f64 {
+    if value.is_nan() { f64::INFINITY } else { value }
 }
 
 #[cfg(test)]

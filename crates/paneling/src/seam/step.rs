@@ -10,7 +10,7 @@ use crate::fit::state::{EXACT, Fit};
 use crate::layout::panels::{PanelSet, SEAM_SAMPLES, Seam};
 use crate::pulse::{Pulse, Stop};
 use crate::seam::system::{Solution, System};
-use crate::seam::unknowns::{Seams, parts};
+use crate::seam::unknowns::{SeamOptions, Seams, parts};
 use gp_solver::{
     Attempt, ConjugateGradients, DampedModel, DampedOptions, DampedRun, DampingPolicy, Descending,
     Observer, SolverError, Status, Step, Verdict,
@@ -32,7 +32,7 @@ pub(crate) struct SeamRun {
 impl SeamRun {
     /// Begins at `fit`; `None` if asked to stop.
     pub(crate) fn new(seams: Seams<'_>, fit: &Fit, pulse: &Pulse<'_>) -> Option<Self> {
-        assert_eq!(seams.weights.len(), seams.set.seams.len(), "one weight per seam");
+        assert_eq!(seams.weights.seams.len(), seams.set.seams.len(), "one weight per seam");
         let energy = Energy::new(seams, fit, pulse)?;
         let damping = vec![FIRST_DAMPING; fit.molds.len()];
         let steps = DampedRun::after(damping, 0, vec![energy.total]);
@@ -239,9 +239,10 @@ impl Energy {
     pub(crate) fn new(seams: Seams<'_>, fit: &Fit, pulse: &Pulse<'_>) -> Option<Self> {
         let Seams { set, options, weights, .. } = seams;
         let of_seams = pulse.map(set.seams.len(), 64, |s| {
-            weights[s] * seam_energy(set, fit, &set.seams[s], options.gap_weight)
+            weights.seams[s] * seam_energy(set, fit, &set.seams[s], options)
         })?;
-        let of_panels = pulse.map(set.len(), 64, |p| fit.panel_energy(set, p))?;
+        let of_panels =
+            pulse.map(set.len(), 64, |p| weights.panels[p] * fit.panel_energy(set, p))?;
         let weight = options.design_weight * options.design_weight;
         let total = of_seams.iter().sum::<f64>() + weight * of_panels.iter().sum::<f64>();
         let mut molds = vec![0.0; fit.molds.len()];
@@ -267,7 +268,7 @@ fn without(trial: &Fit, fit: &Fit, molds: &[bool]) -> Fit {
     part
 }
 
-fn seam_energy(set: &PanelSet, fit: &Fit, seam: &Seam, gap_weight: f64) -> f64 {
+fn seam_energy(set: &PanelSet, fit: &Fit, seam: &Seam, options: &SeamOptions) -> f64 {
     let (points, normals) = set.edge_samples(seam.edge);
     let mut sum = 0.0;
     for k in 0..SEAM_SAMPLES {
@@ -281,8 +282,11 @@ fn seam_energy(set: &PanelSet, fit: &Fit, seam: &Seam, gap_weight: f64) -> f64 {
         let tilt = a.1 - b.1;
         // Only the tangential part counts, as in the rows.
         let along = tilt.dot(normals[k]);
-        let gap = gap_weight * (a.0 - b.0);
-        sum += gap * gap + tilt.length_squared() - along * along;
+        let (gap, squared) = (a.0 - b.0, tilt.length_squared() - along * along);
+        sum += (options.gap_weight * gap).powi(2) + squared;
+        if let Some(hinge) = &options.hinge {
+            sum += hinge.energy(squared.max(0.0).sqrt(), gap.abs());
+        }
     }
     sum
 }

@@ -10,13 +10,15 @@ use crate::fit::state::Fit;
 use crate::layout::panels::{PanelSet, SEAM_SAMPLES};
 use crate::mold::shape::MAX_PARAMETERS;
 use crate::pulse::{Pulse, Stop};
-use crate::seam::unknowns::{Seams, dot, parts, parts_mut};
+use crate::seam::unknowns::{SeamOptions, Seams, dot, parts, parts_mut};
 use gp_solver::{CgOptions, CgReport, ConjugateGradients, LinearOperator, Preconditioner};
 use numerics::{PIVOT_RATIO, factor_semidefinite, solve_semidefinite};
 use rayon::prelude::*;
 
 /// Rows of a seam: a gap and two components of the kink per sample.
 const ROWS: usize = 3 * SEAM_SAMPLES;
+/// And most rows beyond limits: a gap and a kink per sample.
+const MOST_ROWS: usize = ROWS + 2 * SEAM_SAMPLES;
 /// Conjugate gradients per linearisation: Gauss-Newton needs no more than a good direction.
 const CG: CgOptions = CgOptions { rel_tol: 0.03, max_iterations: 40 };
 
@@ -54,12 +56,13 @@ impl<'a> System<'a> {
     pub(crate) fn linearize(seams: Seams<'a>, fit: &'a Fit, pulse: &Pulse<'_>) -> Option<Self> {
         let Seams { set, options, weights, incident } = seams;
         let parts = pulse
-            .map(set.seams.len(), 16, |s| seam_part(set, fit, s, options.gap_weight, weights[s]))?;
+            .map(set.seams.len(), 16, |s| seam_part(set, fit, s, options, weights.seams[s]))?;
         let weight = options.design_weight * options.design_weight;
         let panels = pulse.map_with(set.len(), 16, Vec::new, |rows, p| {
             let mold = &fit.molds[fit.labels[p]];
             let (mut block, mut side) =
                 design_block(set, p, mold, &fit.poses[p], fit.slope_weight, rows);
+            let weight = weight * weights.panels[p];
             block.iter_mut().flatten().chain(&mut side).for_each(|v| *v *= weight);
             for &(s, k) in &incident[p] {
                 for (row, own) in block.iter_mut().zip(&parts[s].own[k]) {
@@ -305,24 +308,51 @@ fn add_product(out: &mut Row, matrix: &Matrix, x: &Row) {
     }
 }
 
-fn seam_part(set: &PanelSet, fit: &Fit, s: usize, gap_weight: f64, seam_weight: f64) -> SeamPart {
+fn seam_part(
+    set: &PanelSet,
+    fit: &Fit,
+    s: usize,
+    options: &SeamOptions,
+    seam_weight: f64,
+) -> SeamPart {
     let seam = &set.seams[s];
     let root = seam_weight.sqrt();
     let (points, normals) = set.edge_samples(seam.edge);
-    let mut residual = [0.0; ROWS];
-    let mut sides = [[[0.0; SIDE]; ROWS]; 2];
+    let mut residual = [0.0; MOST_ROWS];
+    let mut sides = [[[0.0; SIDE]; MOST_ROWS]; 2];
+    let mut count = ROWS;
     for k in 0..SEAM_SAMPLES {
-        let (t1, t2) = normals[k].any_orthonormal_pair();
-        for (side, &p) in seam.panels.iter().enumerate() {
-            let sign = if side == 0 { root } else { -root };
+        let tangents = normals[k].any_orthonormal_pair().into();
+        let here = seam.panels.map(|p| {
             let mold = &fit.molds[fit.labels[p]];
-            let here = seam_side(mold, &fit.poses[p], points[k], normals[k], [t1, t2]);
-            let values = [here.offset, here.tilt[0], here.tilt[1]];
-            for row in 0..3 {
-                let weight = sign * if row == 0 { gap_weight } else { 1.0 };
-                residual[3 * k + row] += weight * values[row];
-                sides[side][3 * k + row] = here.rows[row].map(|v| weight * v);
+            seam_side(mold, &fit.poses[p], points[k], normals[k], tangents)
+        });
+        let [a, b] = &here;
+        let apart = [a.offset - b.offset, a.tilt[0] - b.tilt[0], a.tilt[1] - b.tilt[1]];
+        let mut add = |row: usize, value: f64, factors: [f64; 3]| {
+            residual[row] = value;
+            for (side, sign) in [1.0, -1.0].into_iter().enumerate() {
+                for (of, factor) in here[side].rows.iter().zip(factors) {
+                    let out = sides[side][row].iter_mut();
+                    out.zip(of).for_each(|(o, v)| *o += sign * factor * v);
+                }
             }
+        };
+        let gap_weight = root * options.gap_weight;
+        add(3 * k, gap_weight * apart[0], [gap_weight, 0.0, 0.0]);
+        add(3 * k + 1, root * apart[1], [0.0, root, 0.0]);
+        add(3 * k + 2, root * apart[2], [0.0, 0.0, root]);
+        let Some(hinge) = &options.hinge else { continue };
+        let weight = root * hinge.weight.sqrt();
+        let (gap, kink) = (apart[0].abs(), apart[1].hypot(apart[2]));
+        if gap > hinge.gap {
+            add(count, weight * (gap - hinge.gap), [weight * apart[0].signum(), 0.0, 0.0]);
+            count += 1;
+        }
+        if kink > hinge.kink {
+            let [t1, t2] = [apart[1], apart[2]].map(|t| weight * t / kink);
+            add(count, weight * (kink - hinge.kink), [0.0, t1, t2]);
+            count += 1;
         }
     }
     let mut part = SeamPart {
@@ -331,16 +361,16 @@ fn seam_part(set: &PanelSet, fit: &Fit, s: usize, gap_weight: f64, seam_weight: 
         coupling: [[0.0; SIDE]; SIDE],
     };
     for k in 0..2 {
-        for (row, r) in sides[k].iter().zip(&residual) {
+        for (row, r) in sides[k][..count].iter().zip(&residual) {
             part.sides[k].iter_mut().zip(row).for_each(|(o, a)| *o -= a * r);
         }
     }
     let SeamPart { own, coupling, .. } = &mut part;
     pulp::Arch::new().dispatch(|| {
         for (own, rows) in own.iter_mut().zip(&sides) {
-            add_products(own, rows, rows);
+            add_products(own, &rows[..count], &rows[..count]);
         }
-        add_products(coupling, &sides[0], &sides[1]);
+        add_products(coupling, &sides[0][..count], &sides[1][..count]);
     });
     part
 }

@@ -16,6 +16,42 @@ pub(crate) struct SeamOptions {
     pub(crate) design_weight: f64,
     /// Ends when a step lowers the energy by less than this share.
     pub(crate) stall: f64,
+    /// What kinks and gaps beyond their bounds pay besides.
+    pub(crate) hinge: Option<Hinge>,
+}
+
+/// What kinks and gaps beyond a limit pay besides: `weight` times the square of what is beyond.
+/// Where the limits can be kept this vanishes, so that Gauss-Newton steps are good ones.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Hinge {
+    /// In radians; infinite where there is no bound.
+    pub(crate) kink: f64,
+    /// In units of the panel size; infinite where there is no bound.
+    pub(crate) gap: f64,
+    pub(crate) weight: f64,
+}
+
+impl Hinge {
+    pub(crate) fn energy(&self, kink: f64, gap: f64) -> f64 {
+        let of = |beyond: f64| if beyond > 0.0 { self.weight * beyond * beyond } else { 0.0 };
+        of(kink - self.kink) + of(gap - self.gap)
+    }
+}
+
+/// Factors in the energy of the joint seam step.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct Weights {
+    /// One per seam.
+    pub(crate) seams: Vec<f64>,
+    /// One per panel, of its distance to the design.
+    pub(crate) panels: Vec<f64>,
+}
+
+impl Weights {
+    /// The same for all.
+    pub(crate) fn even(set: &PanelSet) -> Self {
+        Self { seams: vec![1.0; set.seams.len()], panels: vec![1.0; set.len()] }
+    }
 }
 
 /// Poses and molds of a vector of unknowns.
@@ -50,8 +86,7 @@ pub(crate) fn dot(a: &[f64], b: &[f64], panels: usize) -> f64 {
 pub(crate) struct Seams<'a> {
     pub(crate) set: &'a PanelSet,
     pub(crate) options: &'a SeamOptions,
-    /// One factor per seam for its part of the energy.
-    pub(crate) weights: &'a [f64],
+    pub(crate) weights: &'a Weights,
     /// As of [`PanelSet::incident_seams`].
     pub(crate) incident: &'a [Vec<(usize, usize)>],
 }

@@ -11,7 +11,8 @@ use crate::pulse::Pulse;
 use crate::seam::general::{SeamProblem, take};
 use crate::seam::measure::measure;
 use crate::seam::step::SeamRun;
-use crate::search::bounds::Bounds;
+use crate::seam::unknowns::Weights;
+use crate::search::bounds::{Bounds, Excess};
 use crate::search::mending::{SHORT_ALTERNATION, mend, weigh};
 use crate::search::site::Site;
 use gp_solver::{Checkpoint, ConjugateGradients, Extra, Observer, Progress, Stage, Status};
@@ -19,9 +20,12 @@ use std::ops::ControlFlow;
 
 /// Most rounds of mending.
 pub(crate) const MENDING_ROUNDS: usize = 24;
-/// A round of weighing seams that lowers the worst excess by less than this share is followed by
-/// changes of the molds.
-const WEIGHING_STALL: f64 = 0.1;
+/// Rounds of weighing seams in a row that do not lower the worst excess by this share, after which
+/// molds change; so they do once rounds like those so far would not be enough.
+const IDLE: usize = 4;
+const WEIGHING_STALL: f64 = 0.003;
+/// The same, of one round, where molds may be split.
+const SPLIT_STALL: f64 = 0.1;
 
 /// What an attempt has come to.
 #[derive(Clone, Debug)]
@@ -35,20 +39,23 @@ pub(crate) struct Found {
     pub(crate) seam_history: Vec<f64>,
     /// How the seam steps ended.
     pub(crate) seams: Status,
-    /// How many times the worst seam exceeds the bounds; 0 without bounds.
-    pub(crate) excess: f64,
+    /// How many times the bounds are exceeded.
+    pub(crate) excess: Excess,
+    /// What seams and panels weighed in the last seam step.
+    pub(crate) weights: Weights,
 }
 
 impl Found {
     /// A fit before any round or step.
-    pub(crate) fn bare(fit: Fit) -> Self {
+    pub(crate) fn bare(site: &Site<'_>, fit: Fit) -> Self {
         Self {
             fit,
+            weights: Weights::even(&site.set),
             start: 0.0,
             fit_history: Vec::new(),
             seam_history: Vec::new(),
             seams: Status::Interrupted,
-            excess: f64::INFINITY,
+            excess: Excess::UNKNOWN,
         }
     }
 }
@@ -72,13 +79,12 @@ pub(crate) enum Phase {
 pub(crate) struct Attempt {
     pub(crate) fit: Fit,
     pub(crate) start: f64,
-    /// Factors of the seams in the energy.
-    pub(crate) weights: Vec<f64>,
+    pub(crate) weights: Weights,
     pub(crate) fit_history: Vec<f64>,
     pub(crate) phase: Phase,
     /// Rounds of mending.
     pub(crate) round: usize,
-    pub(crate) last_excess: f64,
+    pub(crate) weighing: Weighing,
     pub(crate) best: Option<Found>,
     /// Rounds and steps done.
     pub(crate) steps: usize,
@@ -90,8 +96,16 @@ pub(crate) struct Setting<'s, 'o, 'e> {
     /// Of this attempt; none where it is to take the molds as they are.
     pub(crate) bounds: Option<Bounds>,
     pub(crate) features: &'s [Feature],
-    /// An attempt that costs more is given up.
+    /// An attempt that costs as much is given up.
     pub(crate) limit: f64,
+    /// How far beyond the bounds an attempt may be to be mended.
+    pub(crate) mendable: f64,
+    /// Most rounds of weighing and mending.
+    pub(crate) rounds: usize,
+    /// Most rounds and steps before the last mending.
+    pub(crate) steps: usize,
+    /// Whether mending may make more molds.
+    pub(crate) may_split: bool,
     pub(crate) pulse: &'s Pulse<'o>,
     pub(crate) extra: Option<&'s mut Extra<'e, Error>>,
     /// The stage seam steps belong to.
@@ -104,11 +118,27 @@ impl Attempt {
         Self {
             start: fit.energy(),
             fit,
-            weights: vec![1.0; site.set.seams.len()],
+            weights: Weights::even(&site.set),
             fit_history: Vec::new(),
             phase: Phase::Rounds(alternation, site.options.rounds),
             round: 0,
-            last_excess: f64::INFINITY,
+            weighing: Weighing::default(),
+            best: None,
+            steps: 0,
+        }
+    }
+
+    /// Goes on from a fit of which only some molds have changed, with the weights of before.
+    pub(crate) fn warm(fit: Fit, has_changed: &[bool], weights: Weights) -> Self {
+        let alternation = Alternation::of_some(has_changed);
+        Self {
+            start: fit.energy(),
+            fit,
+            weights,
+            fit_history: Vec::new(),
+            phase: Phase::Rounds(alternation, SHORT_ALTERNATION),
+            round: 0,
+            weighing: Weighing::default(),
             best: None,
             steps: 0,
         }
@@ -124,11 +154,11 @@ impl Attempt {
     }
 
     /// The best so far, or what there is.
-    pub(crate) fn into_found(self) -> Found {
+    pub(crate) fn into_found(self, site: &Site<'_>) -> Found {
         let Self { fit, start, fit_history, .. } = self;
         match self.best {
             Some(best) => Found { start, fit_history, ..best },
-            None => Found { start, fit_history, ..Found::bare(fit) },
+            None => Found { start, fit_history, ..Found::bare(site, fit) },
         }
     }
 
@@ -157,10 +187,22 @@ impl Attempt {
             }
             Phase::Seams(run) => {
                 let taken = run.steps.history().len();
-                run.step(site.seams(&self.weights), &mut self.fit, solver, pulse);
+                run.step(
+                    site.seams(&self.weights, setting.bounds.is_some()),
+                    &mut self.fit,
+                    solver,
+                    pulse,
+                );
                 self.steps += run.steps.history().len() - taken;
                 match run.status {
-                    None => Ok(Some(())),
+                    // Within the bounds nothing more is asked for.
+                    None => match setting.bounds {
+                        Some(bounds) if self.judged(&bounds, site).is_within() => {
+                            let history = run_history(&self.phase);
+                            Ok(self.end_seams(history, Status::Converged, setting))
+                        }
+                        _ => Ok(Some(())),
+                    },
                     Some(Status::Interrupted) => Ok(None),
                     Some(status) => {
                         let history = run.steps.history().to_vec();
@@ -173,12 +215,17 @@ impl Attempt {
         }
     }
 
+    fn judged(&self, bounds: &Bounds, site: &Site<'_>) -> Excess {
+        let Fit { molds, labels, poses, .. } = &self.fit;
+        bounds.judge(&measure(&site.set, molds, labels, poses))
+    }
+
     fn begin_seams(&mut self, setting: &mut Setting<'_, '_, '_>) -> Result<Option<()>, Error> {
         let site = setting.site;
         if site.seam.steps == 0 {
             return Ok(self.end_seams(Vec::new(), Status::Converged, setting));
         }
-        let seams = site.seams(&self.weights);
+        let seams = site.seams(&self.weights, setting.bounds.is_some());
         if let Some(extra) = setting.extra.as_deref_mut()
             && SeamProblem::new(seams, &self.fit)?.extend(&setting.stage, extra)?
         {
@@ -186,6 +233,14 @@ impl Attempt {
             return Ok(Some(()));
         }
         let Some(run) = SeamRun::new(seams, &self.fit, setting.pulse) else { return Ok(None) };
+        if let Some(bounds) = setting.bounds {
+            // Seam steps may leave the design where the bounds cannot be met.
+            let excess = self.judged(&bounds, site);
+            if self.best.as_ref().is_none_or(|b| excess.is_less(&b.excess)) {
+                let weights = self.weights.clone();
+                self.best = Some(Found { excess, weights, ..Found::bare(site, self.fit.clone()) });
+            }
+        }
         self.phase = Phase::Seams(run);
         Ok(Some(()))
     }
@@ -198,7 +253,7 @@ impl Attempt {
     ) -> Result<Option<()>, Error> {
         let Phase::General(history, resumed) = &mut self.phase else { return Ok(Some(())) };
         let (mut history, resumed) = (std::mem::take(history), resumed.take());
-        let seams = setting.site.seams(&self.weights);
+        let seams = setting.site.seams(&self.weights, false);
         let mut problem = SeamProblem::new(seams, &self.fit)?;
         if let Some(extra) = setting.extra.as_deref_mut() {
             problem.extend(&setting.stage, extra)?;
@@ -227,41 +282,101 @@ impl Attempt {
         let Setting { site, pulse, .. } = *setting;
         self.fit.update_energies(&site.set, pulse)?;
         let (start, fit_history) = (self.start, Vec::new());
+        let weights = self.weights.clone();
         let found = |fit: &Fit, excess| {
             let fit = fit.clone();
-            Found { fit, start, fit_history, seam_history, seams: status, excess }
+            Found { fit, start, fit_history, seam_history, seams: status, excess, weights }
         };
         let Some(bounds) = setting.bounds else {
-            self.best = Some(found(&self.fit, 0.0));
+            self.best = Some(found(&self.fit, Excess::NONE));
             self.phase = Phase::Done;
             return Some(());
         };
         let measures = measure(&site.set, &self.fit.molds, &self.fit.labels, &self.fit.poses);
-        let excess = bounds.worst_excess(&measures);
-        if self.best.as_ref().is_none_or(|b| excess < b.excess) {
+        let excess = bounds.judge(&measures);
+        if self.best.as_ref().is_none_or(|b| excess.is_less(&b.excess)) {
             self.best = Some(found(&self.fit, excess));
         }
-        let is_spent = self.round == MENDING_ROUNDS || site.cost(&self.fit) >= setting.limit;
-        if excess <= 1.0 || is_spent {
+        let is_spent = self.round >= setting.rounds
+            || self.steps >= setting.steps
+            || site.cost(&self.fit) >= setting.limit;
+        let worst = excess.worst();
+        if excess.is_within() || is_spent || worst > setting.mendable {
             self.phase = Phase::Done;
             return Some(());
         }
         weigh(&bounds, &measures, &mut self.weights);
-        let mut most = 0;
-        if excess > (1.0 - WEIGHING_STALL) * self.last_excess || site.seam.steps == 0 {
-            if !mend(site, &bounds, &mut self.fit, &measures, setting.features, pulse)? {
-                self.phase = Phase::Done;
+        let rounds = setting.rounds.saturating_sub(self.round);
+        let is_hopeful = self.weighing.goes_on(worst, rounds, setting.may_split);
+        // Without a mending no round is left to do, and the seam step follows at once.
+        self.phase = Phase::Rounds(Alternation::new(self.fit.molds.len()), 0);
+        if !is_hopeful || site.seam.steps == 0 {
+            let (features, may_split) = (setting.features, setting.may_split);
+            let changed =
+                mend(site, &bounds, &mut self.fit, &measures, features, may_split, pulse)?;
+            if !changed.contains(&true) {
+                if self.weighing.idle >= IDLE || site.seam.steps == 0 {
+                    self.phase = Phase::Done;
+                }
+                self.round += 1;
                 return Some(());
             }
-            most = SHORT_ALTERNATION;
-            self.last_excess = f64::INFINITY;
-        } else {
-            self.last_excess = excess;
+            let rounds = if setting.may_split {
+                Alternation::new(changed.len())
+            } else {
+                Alternation::of_some(&changed)
+            };
+            self.phase = Phase::Rounds(rounds, SHORT_ALTERNATION);
+            self.weighing = Weighing::default();
         }
         self.round += 1;
-        // Without a mending no round is left to do, and the seam step follows at once.
-        self.phase = Phase::Rounds(Alternation::new(self.fit.molds.len()), most);
         Some(())
+    }
+}
+
+/// How weighing the seams has gone since molds have last changed.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Weighing {
+    pub(crate) rounds: usize,
+    /// Rounds since the least excess.
+    pub(crate) idle: usize,
+    /// The first excess, and the least.
+    pub(crate) first: f64,
+    pub(crate) least: f64,
+}
+
+impl Default for Weighing {
+    fn default() -> Self {
+        Self { rounds: 0, idle: 0, first: f64::INFINITY, least: f64::INFINITY }
+    }
+}
+
+impl Weighing {
+    /// Takes an excess down, and says whether another of at most so many rounds is worth while.
+    fn goes_on(&mut self, excess: f64, rounds_left: usize, may_split: bool) -> bool {
+        let (stall, most) = if may_split { (SPLIT_STALL, 1) } else { (WEIGHING_STALL, IDLE) };
+        if self.rounds == 0 {
+            self.first = excess;
+        }
+        if excess < (1.0 - stall) * self.least {
+            self.least = excess;
+            self.idle = 0;
+        } else {
+            self.idle += 1;
+        }
+        self.rounds += 1;
+        let (rounds, left) = (self.rounds as f64 - 1.0, rounds_left as f64);
+        let gain = self.least / self.first;
+        let goal = self.least * gain.powf(left / rounds.max(1.0));
+        self.idle < most && (rounds < 2.0 || goal <= 1.0)
+    }
+}
+
+/// Energies of the seam steps of a phase.
+fn run_history(phase: &Phase) -> Vec<f64> {
+    match phase {
+        Phase::Seams(run) => run.steps.history().to_vec(),
+        Phase::Rounds(..) | Phase::General(..) | Phase::Done => Vec::new(),
     }
 }
 

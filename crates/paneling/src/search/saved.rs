@@ -9,7 +9,9 @@ use crate::layout::panels::Pose;
 use crate::mold::shape::{MAX_PARAMETERS, Mold, MoldType};
 use crate::pulse::Pulse;
 use crate::seam::step::SeamRun;
-use crate::search::attempt::{Attempt, Found, Phase};
+use crate::seam::unknowns::Weights;
+use crate::search::attempt::{Attempt, Found, Phase, Weighing};
+use crate::search::bounds::Excess;
 use crate::search::site::Site;
 use glam::{DMat3, DVec3};
 use gp_solver::{Checkpoint, DampedRun, SolverError, Status};
@@ -98,12 +100,26 @@ fn fit(of: &Checkpoint, name: &str, site: &Site<'_>) -> Result<Fit, SolverError>
     })
 }
 
+fn put_weights(to: Checkpoint, name: &str, weights: &Weights) -> Checkpoint {
+    let to = put_bits(to, &format!("{name}seam weights"), &weights.seams);
+    put_bits(to, &format!("{name}panel weights"), &weights.panels)
+}
+
+fn weights(of: &Checkpoint, name: &str, site: &Site<'_>) -> Result<Weights, SolverError> {
+    Ok(Weights {
+        seams: some_bits(of, &format!("{name}seam weights"), site.set.seams.len())?,
+        panels: some_bits(of, &format!("{name}panel weights"), site.set.len())?,
+    })
+}
+
 /// Adds what an attempt has come to.
 pub(crate) fn put_found(to: Checkpoint, name: &str, found: &Found) -> Checkpoint {
     let to = put_fit(to, name, &found.fit);
     let to = put_bits(to, &format!("{name} rounds"), &found.fit_history);
     let to = put_bits(to, &format!("{name} steps"), &found.seam_history);
-    let to = put_bits(to, &format!("{name} sizes"), &[found.start, found.excess]);
+    let Excess { seams, design } = found.excess;
+    let to = put_bits(to, &format!("{name} sizes"), &[found.start, seams, design]);
+    let to = put_weights(to, &format!("{name} "), &found.weights);
     let status = ENDS.iter().position(|s| *s == found.seams).unwrap_or(0);
     to.with_counts(&format!("{name} end"), &[status as u64])
 }
@@ -118,23 +134,26 @@ pub(crate) fn found(
     if !of.counts.contains_key(&end) {
         return Ok(None);
     }
-    let sizes = some_bits(of, &format!("{name} sizes"), 2)?;
+    let sizes = some_bits(of, &format!("{name} sizes"), 3)?;
     Ok(Some(Found {
         fit: fit(of, name, site)?,
         fit_history: bits(of, &format!("{name} rounds"))?,
         seam_history: bits(of, &format!("{name} steps"))?,
         seams: *ENDS.get(counts::<1>(of, &end)?[0]).ok_or_else(|| damaged(&end))?,
         start: sizes[0],
-        excess: sizes[1],
+        excess: Excess { seams: sizes[1], design: sizes[2] },
+        weights: weights(of, &format!("{name} "), site)?,
     }))
 }
 
 /// Adds an attempt.
 pub(crate) fn put_attempt(to: Checkpoint, attempt: &Attempt) -> Checkpoint {
     let to = put_fit(to, "fit", &attempt.fit);
-    let to = put_bits(to, "weights", &attempt.weights);
+    let to = put_weights(to, "", &attempt.weights);
     let to = put_bits(to, "rounds", &attempt.fit_history);
-    let to = put_bits(to, "sizes", &[attempt.start, attempt.last_excess]);
+    let Weighing { rounds, idle, first, least } = attempt.weighing;
+    let to = put_bits(to, "sizes", &[attempt.start, first, least]);
+    let to = to.with_counts("weighing", &[rounds as u64, idle as u64]);
     let to = match &attempt.best {
         Some(found) => put_found(to, "best of the attempt", found),
         None => to,
@@ -162,10 +181,12 @@ pub(crate) fn put_attempt(to: Checkpoint, attempt: &Attempt) -> Checkpoint {
     }
 }
 
-/// The attempt [`put_attempt`] has added, if there is one; `None` inside if asked to stop.
+/// The attempt [`put_attempt`] has added, if there is one; `None` inside if asked to stop. `towards`
+/// bounds or not, as of [`Site::seams`].
 pub(crate) fn attempt(
     of: &Checkpoint,
     site: &Site<'_>,
+    towards: bool,
     pulse: &Pulse<'_>,
 ) -> Result<Option<Option<Attempt>>, SolverError> {
     if !of.counts.contains_key("place") {
@@ -173,7 +194,7 @@ pub(crate) fn attempt(
     }
     let [kind, done, most, round, steps] = counts(of, "place")?;
     let fit = fit(of, "fit", site)?;
-    let weights = some_bits(of, "weights", site.set.seams.len())?;
+    let weights = weights(of, "", site)?;
     let phase = match kind {
         0 => {
             let damping = some_bits(of, "dampings", fit.molds.len())?;
@@ -184,7 +205,7 @@ pub(crate) fn attempt(
         1 => {
             let damping = some_bits(of, "dampings", fit.molds.len())?;
             let state = DampedRun::after(damping, done, bits(of, "energy")?);
-            let run = SeamRun::resumed(site.seams(&weights), &fit, state, pulse);
+            let run = SeamRun::resumed(site.seams(&weights, towards), &fit, state, pulse);
             let Some(run) = run else { return Ok(Some(None)) };
             Phase::Seams(run)
         }
@@ -192,13 +213,14 @@ pub(crate) fn attempt(
         3 => Phase::Done,
         _ => return Err(damaged("place")),
     };
-    let sizes = some_bits(of, "sizes", 2)?;
+    let sizes = some_bits(of, "sizes", 3)?;
+    let [rounds, idle] = counts(of, "weighing")?;
     Ok(Some(Some(Attempt {
         phase,
         fit,
         weights,
         start: sizes[0],
-        last_excess: sizes[1],
+        weighing: Weighing { rounds, idle, first: sizes[1], least: sizes[2] },
         fit_history: bits(of, "rounds")?,
         round,
         steps,

@@ -5,15 +5,22 @@ use crate::fit::clustering::{self, Clusters, Feature};
 use crate::fit::state::Fit;
 use crate::layout::panels::PanelSet;
 use crate::mold::prices::PriceList;
-use crate::mold::shape::MoldType;
-use crate::options::{Clustering, MoldRule, Options};
+use crate::mold::shape::{Mold, MoldType, blank};
+use crate::options::{Clustering, MAX_DEVIATION, MoldRule, Options, SheetSize};
 use crate::pulse::Pulse;
-use crate::seam::unknowns::{SeamOptions, Seams};
+use crate::seam::unknowns::{Hinge, SeamOptions, Seams, Weights};
 use crate::search::bounds::Bounds;
 use gp_solver::Fingerprint;
 
-/// A seam step that lowers the energy by less than this share is the last.
+/// A seam step that lowers the energy by less than this share is the last; and the last before
+/// seams are weighed anew.
 const SEAM_STALL: f64 = 3e-2;
+const BOUNDED_STALL: f64 = 0.1;
+/// Kinks and gaps beyond this share of their bounds pay so much more.
+const LIMIT: f64 = 0.95;
+const HINGE_WEIGHT: f64 = 100.0;
+/// Area of a blank where panels do not lie on it yet: a panel has about 4 in its own size.
+const USUAL_BLANK: f64 = 12.0;
 
 /// Panels, prices and settings of a run. Lengths are in units of the panel size.
 pub(crate) struct Site<'a> {
@@ -27,6 +34,8 @@ pub(crate) struct Site<'a> {
     /// Curvatures of the panels in units of the model: the published grid clusters by these.
     curvatures: &'a [[f64; 2]],
     pub(crate) seam: SeamOptions,
+    /// The same towards bounds, if these are the rule.
+    bounded: SeamOptions,
     pub(crate) incident: Vec<Vec<(usize, usize)>>,
     /// Lengths here per length of the model.
     pub(crate) unit: f64,
@@ -42,12 +51,24 @@ impl<'a> Site<'a> {
         let (mut rule, types, unit) = (options.rule()?, options.types(), 1.0 / panels.size);
         prices.check(&types)?;
         if let MoldRule::Bounds(bounds) = &mut rule {
+            let deviation = bounds.max_deviation.unwrap_or(MAX_DEVIATION * panels.extent);
+            bounds.max_deviation = Some(deviation / panels.size);
             bounds.max_gap = bounds.max_gap.map(|g| g / panels.size);
         }
         if let MoldRule::Count(molds) = rule
             && (molds == 0 || molds > panels.len())
         {
             return Err(Error::MoldCount { molds, panels: panels.len() });
+        }
+        if let Some(SheetSize { width, height }) = options.panel_max {
+            let limit = [width.max(height), width.min(height)];
+            for panel in 0..panels.len() {
+                let size = panels.breadths(panel);
+                if size[0] > limit[0] || size[1] > limit[1] {
+                    let [u, v] = panels.middles[panel];
+                    return Err(Error::PanelTooLarge { panel, u, v, size, limit });
+                }
+            }
         }
         let set = panels.scaled(unit);
         let incident = set.incident_seams();
@@ -56,9 +77,19 @@ impl<'a> Site<'a> {
             gap_weight: 1.0,
             design_weight: 0.1,
             stall: SEAM_STALL,
+            hinge: None,
+        };
+        let bounded = match rule {
+            MoldRule::Bounds(Bounds { max_kink, max_gap, .. }) => {
+                let limit = |bound: Option<f64>| bound.map_or(f64::INFINITY, |b| LIMIT * b);
+                let [kink, gap] = [max_kink, max_gap].map(limit);
+                let hinge = Some(Hinge { kink, gap, weight: HINGE_WEIGHT });
+                SeamOptions { stall: BOUNDED_STALL, hinge, ..seam }
+            }
+            MoldRule::PerRoot(_) | MoldRule::Count(_) => seam,
         };
         let curvatures = panels.curvatures();
-        Ok(Self { options, prices, rule, types, set, curvatures, seam, incident, unit })
+        Ok(Self { options, prices, rule, types, set, curvatures, seam, bounded, incident, unit })
     }
 
     /// The bounds, if these are the rule.
@@ -74,9 +105,10 @@ impl<'a> Site<'a> {
         self.types[self.types.len() - 1]
     }
 
-    /// The seam step with these weights of the seams.
-    pub(crate) fn seams<'s>(&'s self, weights: &'s [f64]) -> Seams<'s> {
-        Seams { set: &self.set, options: &self.seam, weights, incident: &self.incident }
+    /// The seam step with these weights, `towards` bounds or without regard to them.
+    pub(crate) fn seams<'s>(&'s self, weights: &'s Weights, towards: bool) -> Seams<'s> {
+        let options = if towards { &self.bounded } else { &self.seam };
+        Seams { set: &self.set, options, weights, incident: &self.incident }
     }
 
     /// The shapes of all panels; `None` if asked to stop.
@@ -114,7 +146,19 @@ impl<'a> Site<'a> {
 
     /// Total cost of molds and panels.
     pub(crate) fn cost(&self, fit: &Fit) -> f64 {
-        fit.molds.iter().zip(&fit.members).map(|(m, p)| self.prices.cost(m.kind, p.len())).sum()
+        let of = |(mold, members): (&Mold, &Vec<usize>)| {
+            let border = members
+                .iter()
+                .flat_map(|&p| self.set.border(p).iter().map(move |x| fit.poses[p].to_local(*x)));
+            let area = blank(border) / (self.unit * self.unit);
+            self.prices.cost(mold.kind, members.len(), area)
+        };
+        fit.molds.iter().zip(&fit.members).map(of).sum()
+    }
+
+    /// About what a mold of a type and so many panels on it cost, before they are fitted.
+    pub(crate) fn price(&self, kind: MoldType, panels: usize) -> f64 {
+        self.prices.cost(kind, panels, USUAL_BLANK / (self.unit * self.unit))
     }
 
     /// Of everything a run depends on.
