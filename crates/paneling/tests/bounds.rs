@@ -115,9 +115,10 @@ fn looser_bounds_need_no_more_molds_and_the_slack_is_spent() {
 fn within_bounds_every_gap_is_too() {
     let roof = Shape::Roof.surface(14, 14, 4, 4);
     let free = within(&roof, &options(10, 1.0, &[MoldType::Cubic]));
-    let max_gap = Some(0.3 * free.result.measures.gaps.max);
-    let held = within(&roof, &Options { max_gap, ..options(10, 1.0, &[MoldType::Cubic]) });
-    assert!(held.result.measures.gaps.max <= max_gap.unwrap() * (1.0 + 1e-9));
+    let most = 0.3 * free.result.measures.gaps.max;
+    let bounded = Options { max_gap: Some(most), ..options(10, 1.0, &[MoldType::Cubic]) };
+    let held = within(&roof, &bounded);
+    assert!(held.result.measures.gaps.max <= most * (1.0 + 1e-9));
     assert!(held.metrics.quality.molds >= free.metrics.quality.molds);
 }
 
