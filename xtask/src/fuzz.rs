@@ -115,7 +115,7 @@ fn write_seeds(target: &str, folder: &Path) -> Outcome {
         let path = folder.join(name);
         fs::write(&path, bytes).map_err(|e| format!("{}: {e}", path.display()))
     };
-    for (name, text) in OPTION_SEEDS.iter().filter(|(name, _)| *name == target) {
+    if let Some((name, text)) = OPTION_SEEDS.iter().find(|(name, _)| *name == target) {
         return put(format!("{name}.ron"), text.as_bytes());
     }
     // The name of a program cannot begin with a digit.
