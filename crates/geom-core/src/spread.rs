@@ -46,18 +46,26 @@ impl Spread {
     fn coarsen(&mut self) {
         // Stable, so that weights of one bin are added in the order they came.
         self.values.sort_by(|a, b| a.0.total_cmp(&b.0));
+        // Those that came since the last time may have bins already.
+        self.bin();
         while self.values.len() > LIMIT / 2 && self.dropped + COARSER < MANTISSA {
             self.dropped += COARSER;
-            let dropped = self.dropped;
-            self.values.iter_mut().for_each(|(value, _)| *value = shortened(*value, dropped));
-            self.values.dedup_by(|next, first| {
-                let same = next.0 == first.0;
-                if same {
-                    first.1 += next.1;
-                }
-                same
-            });
+            self.bin();
         }
+    }
+
+    fn bin(&mut self) {
+        let dropped = self.dropped;
+        if dropped > 0 {
+            self.values.iter_mut().for_each(|(value, _)| *value = shortened(*value, dropped));
+        }
+        self.values.dedup_by(|next, first| {
+            let same = next.0 == first.0;
+            if same {
+                first.1 += next.1;
+            }
+            same
+        });
     }
 
     /// The values below which the given shares of the weight lie; `None` without weight.

@@ -8,7 +8,7 @@ use crate::input_file::{self, PartArgs, SurfaceArgs};
 use crate::net_files::{self, NetInput};
 use crate::net_report;
 use crate::option_flags::{self, OptionFlags};
-use crate::outcome::Outcome;
+use crate::outcome::{Outcome, Status};
 use crate::report_support;
 use crate::watch::Watch;
 use exchange::LengthUnit;
@@ -16,7 +16,7 @@ use geom_core::TriMesh;
 use gp_solver::{OptionValue, SolverError};
 use hyperbolic_nets::{Error, Input, Options, QuadNet, Solution, solve};
 use std::path::PathBuf;
-use workflows::nets::{Did, InputEdges, Prepared, prepare, prepare_surface};
+use workflows::nets::{self, Did, InputEdges, Prepared, prepare, prepare_surface};
 
 /// Arguments of `hnet`.
 #[derive(Debug, clap::Args)]
@@ -68,7 +68,10 @@ impl Hnet {
             .of(&self.input)
             .with_checkpoints(&self.checkpoint)?
             .with_systems(self.system.dump_system.as_deref())?;
-        let Given { net, surface, unit, mut warnings, did } = self.read(context, &mut watch)?;
+        let Some(given) = self.read(context, &mut watch)? else {
+            return Ok(Outcome::new(Status::Interrupted, 0).with_input(&self.input));
+        };
+        let Given { net, surface, unit, mut warnings, did } = given;
         let reference = match &self.reference {
             None => surface,
             Some(path) => {
@@ -122,7 +125,8 @@ struct Given {
 }
 
 impl Hnet {
-    fn read(&self, context: &Context, watch: &mut Watch<'_>) -> Result<Given, Failure> {
+    /// None if it was interrupted while a net was made.
+    fn read(&self, context: &Context, watch: &mut Watch<'_>) -> Result<Option<Given>, Failure> {
         if net_files::is_net(context, &self.input) {
             let (input, unit, warnings) = net_files::read(context, &self.input, &self.part)?;
             let net = match input {
@@ -131,7 +135,7 @@ impl Hnet {
                     QuadNet::new(&mesh).map_err(|e| Failure::input(&self.input, e))?
                 }
             };
-            return Ok(Given { net, surface: None, unit, warnings, did: None });
+            return Ok(Some(Given { net, surface: None, unit, warnings, did: None }));
         }
         let none = ConfigArgs { config: None };
         let options = self.remesh.options(&none)?;
@@ -147,11 +151,15 @@ impl Hnet {
                 prepare(&mesh.positions, &faces, self.input_edges, &options, watch)
             }
         };
-        let Prepared { net, reference, did, warnings } =
-            prepared.map_err(|e| option_flags::refused::<quad_remesh::Options>(&self.input, e))?;
+        let Prepared { net, reference, did, warnings } = match prepared {
+            Err(nets::Error::Remesh(quad_remesh::Error::Interrupted)) => return Ok(None),
+            other => {
+                other.map_err(|e| option_flags::refused::<quad_remesh::Options>(&self.input, e))?
+            }
+        };
         let told = warnings.iter().map(|w| option_flags::in_flags::<quad_remesh::Options>(w));
         let warnings = model.warnings.iter().cloned().chain(told).collect();
-        Ok(Given { net, surface: reference, unit: model.unit, warnings, did: Some(did) })
+        Ok(Some(Given { net, surface: reference, unit: model.unit, warnings, did: Some(did) }))
     }
 }
 

@@ -5,11 +5,11 @@ use crate::context::Context;
 use crate::failure::Failure;
 use crate::input_file::{self, PartArgs, SurfaceArgs};
 use crate::option_flags::{self, OptionFlags};
-use crate::outcome::Outcome;
+use crate::outcome::{Outcome, Status};
 use crate::report_support::{self, mesh::mesh_view};
 use crate::watch::Watch;
 use exchange::{Mesh, Model};
-use quad_remesh::{Options, Solution, solve, solve_surface};
+use quad_remesh::{Error, Options, Solution, solve, solve_surface};
 use report::{LineRole, LineSet};
 use std::path::PathBuf;
 
@@ -56,7 +56,12 @@ impl Remesh {
                 solve(&mesh.positions, &faces, &options, &mut watch)
             }
         };
-        let solution = solution.map_err(|e| option_flags::refused::<Options>(&self.input, e))?;
+        let solution = match solution {
+            Err(Error::Interrupted) => {
+                return Ok(Outcome::new(Status::Interrupted, 0).with_input(&self.input));
+            }
+            other => other.map_err(|e| option_flags::refused::<Options>(&self.input, e))?,
+        };
         let mut outcome = Outcome::new(solution.status, 0)
             .with_input(&self.input)
             .with_metrics(&solution.metrics)?;

@@ -129,7 +129,7 @@ pub(crate) struct SeamSide {
 
 /// A step along the line this much smaller than the first is the last: the next would be smaller by
 /// the square.
-const FOOT_STEP: f64 = 1e-7;
+const FOOT_STEP: f64 = 1e-9;
 
 /// Where the line through a design point along its normal meets the mold, and the mold's unit
 /// normal there: offset along the line and normal in local coordinates.
