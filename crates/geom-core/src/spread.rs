@@ -6,8 +6,6 @@ use std::cmp::Ordering;
 const LIMIT: usize = 1 << 20;
 /// Bits of the mantissa of an `f64`.
 const MANTISSA: u32 = 52;
-/// Bits that are dropped more each time there are too many values.
-const COARSER: u32 = 4;
 /// Ranges as short as this are sorted.
 const SHORT: usize = 32;
 
@@ -48,8 +46,8 @@ impl Spread {
         self.values.sort_by(|a, b| a.0.total_cmp(&b.0));
         // Those that came since the last time may have bins already.
         self.bin();
-        while self.values.len() > LIMIT / 2 && self.dropped + COARSER < MANTISSA {
-            self.dropped += COARSER;
+        while self.values.len() > LIMIT / 2 && self.dropped + 1 < MANTISSA {
+            self.dropped += 1;
             self.bin();
         }
     }
