@@ -89,7 +89,7 @@ pub enum Error {
 /// [`Error`], from the step that failed.
 ///
 /// # Example
-/// See the [crate](crate)'s.
+/// See that of the [crate].
 pub fn prepare<F: AsRef<[u32]>>(
     points: &[DVec3],
     faces: &[F],
