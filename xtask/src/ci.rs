@@ -1,10 +1,15 @@
 //! `cargo xtask ci`: everything a change must pass.
 
 use crate::shell::{Outcome, cargo, check, is_installed, root};
-use crate::{regress, tidy};
+use crate::{attack, regress, tidy};
 use std::io::{BufRead, BufReader};
 use std::process::{Command, Stdio};
+use std::thread;
 use std::time::Instant;
+
+/// How long the commands are attacked, and which attacks that are.
+const ATTACK_SECONDS: &str = "120";
+const ATTACK_SEED: &str = "1";
 
 /// Runs every check in turn, stops at the first that fails, and ends with the list of what was skipped.
 pub(crate) fn run() -> Outcome {
@@ -21,8 +26,14 @@ pub(crate) fn run() -> Outcome {
     })?;
     step("weingarten for the web", || wasm(&mut skipped))?;
     step("tidy", tidy::run)?;
-    step("regress", || {
-        skipped.extend(regress::run(&[])?);
+    // Attacks are processes of milliseconds and waits, which leave most of the machine to the scenes.
+    step("regress, with attacks beside it", || {
+        let told = thread::scope(|scope| {
+            let attacks = scope.spawn(|| attack::run(ATTACK_SECONDS, ATTACK_SEED));
+            skipped.extend(regress::run(&[])?);
+            attacks.join().unwrap_or_else(|_| Err("the attacks could not be made".to_owned()))
+        })?;
+        println!("attacks: {told}");
         Ok(())
     })?;
     if is_installed("cargo-deny") {

@@ -1,7 +1,7 @@
 //! `cargo xtask nightly`: what takes too long for every change, with a table of what was run.
 
 use crate::shell::{Outcome, build_umbilic, cargo, check, root, write};
-use crate::{bench, fuzz, judges, restarts};
+use crate::{attack, bench, fuzz, judges, restarts};
 use std::fmt::Write;
 use std::time::Instant;
 
@@ -28,6 +28,7 @@ pub(crate) fn run() -> Outcome {
         lines.push(Line { what, seconds, outcome });
     };
     step("converged results started again", &|| restarts::run());
+    step("hostile files, options and moments", &|| attack::run("600", "2"));
     step("independent programs read what we write", &|| judges::run().map(|()| String::new()));
     step("tests that measure time", &|| {
         let test = ["test", "--workspace", "--quiet", "--", "--ignored"];

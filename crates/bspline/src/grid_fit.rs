@@ -170,7 +170,9 @@ fn knots(
             knots.extend((1..spans).map(|j| parameters[j..j + d].iter().sum::<f64>() / d as f64));
         } else {
             let step = n as f64 / spans as f64;
-            knots.extend((1..spans).map(|j| at(j as f64 * step - 1.0)));
+            // Counted from the middles between parameters, so that a grid read from its other end has
+            // the same knots.
+            knots.extend((1..spans).map(|j| at(j as f64 * step - 0.5)));
         }
         knots.extend(vec![1.0; d + 1]);
         KnotVector::new(degree, knots)
@@ -305,6 +307,22 @@ mod tests {
             let fit = fit_grid(&wave(9, 8), 9, 8, false, &options).unwrap();
             assert!(fit.distance_max < 1e-12, "degree {degree}: {}", fit.distance_max);
         }
+    }
+
+    #[test]
+    fn a_grid_read_from_another_corner_has_the_same_surface() {
+        let (n_u, n_v) = (23, 17);
+        let points = wave(n_u, n_v);
+        let options =
+            GridFitOptions { control_points: Some((9, 8)), ..GridFitOptions::default() };
+        let fit = fit_grid(&points, n_u, n_v, false, &options).unwrap();
+        let turned: Vec<DVec3> = points.iter().rev().copied().collect();
+        let other = fit_grid(&turned, n_u, n_v, false, &options).unwrap();
+        for (u, v) in [(0.0, 0.0), (0.31, 0.77), (0.5, 0.08), (0.93, 1.0)] {
+            let (here, there) = (fit.surface.point(u, v), other.surface.point(1.0 - u, 1.0 - v));
+            assert!(here.distance(there) < 1e-12, "{here} and {there}");
+        }
+        assert_close(fit.distance_max, other.distance_max, 1e-12);
     }
 
     #[test]

@@ -5,6 +5,7 @@ use crate::fit::clustering::DiagramAxis;
 use crate::layout::tiling::Pattern;
 use crate::mold::shape::MoldType;
 use crate::search::bounds::Bounds;
+use geom_core::Normalization;
 use gp_solver::{Counts, List, OptionValue, choices, options, serde_as_text};
 use serde::{Deserialize, Serialize};
 
@@ -174,7 +175,8 @@ impl Options {
             ("panel_max", self.panel_max.map(|s| s.height)),
         ];
         for (name, value) in positive {
-            if let Some(value) = value.filter(|v| !(*v > 0.0 && v.is_finite())) {
+            // Squares and shares of it stay numbers.
+            if let Some(value) = value.filter(|v| !(*v > 0.0 && *v <= Normalization::LARGEST)) {
                 return Err(Error::BadOption { name, value });
             }
         }

@@ -197,13 +197,18 @@ impl Unknowns {
     }
 }
 
-/// The vertex nearest to the middle of the surface.
+/// Vertices that are so nearly as far from the middle as the nearest count as equally far: on a ring
+/// all are, and which of them wins must not be a matter of rounding.
+const AS_NEAR: f64 = 1.0 + 1e-9;
+
+/// The vertex nearest to the middle of the surface; of several the first.
 fn middle(surface: &Surface) -> usize {
     let weighted = (0..surface.areas.len()).map(|f| surface.centre(f) * surface.areas[f]);
     let middle = weighted.sum::<geom_core::DVec3>() / surface.area();
-    let away = |v: &usize| surface.positions[*v].distance_squared(middle);
-    let vertices = (0..surface.positions.len()).filter(|&v| !surface.star(v).is_empty());
-    vertices.min_by(|a, b| away(a).total_cmp(&away(b))).unwrap_or(0)
+    let away = |v: usize| surface.positions[v].distance(middle);
+    let vertices = || (0..surface.positions.len()).filter(|&v| !surface.star(v).is_empty());
+    let least = vertices().map(away).fold(f64::INFINITY, f64::min);
+    vertices().find(|&v| away(v) <= AS_NEAR * least).unwrap_or(0)
 }
 
 /// Solves the rows, each a sum that vanishes, for some of `count` whole numbers in terms of the

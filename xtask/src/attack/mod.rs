@@ -41,7 +41,9 @@ pub(crate) fn run(seconds: &str, seed: &str) -> Outcome<String> {
         match turn % 16 {
             0 => promises::threads(&mut lab, &mut random)?,
             1 => promises::kill(&mut lab, &mut random)?,
-            2..8 => options::attempt(&mut lab, &mut random, &known)?,
+            2 => promises::interrupt(&mut lab, &mut random)?,
+            3 => promises::race(&mut lab, &mut random)?,
+            4..9 => options::attempt(&mut lab, &mut random, &known)?,
             _ => mutation_of(random.one(&targets), &mut lab, &mut random)?,
         }
     }
@@ -63,11 +65,12 @@ fn mutation_of(target: &targets::Target, lab: &mut Lab, random: &mut Random) -> 
     lab.attempt(&arguments, Some(&path))
 }
 
-/// A checkpoint to be made worse.
+/// A checkpoint and metrics to be made worse.
 fn state(lab: &Lab) -> Outcome {
     let mut command = umbilic();
     command.args(["weingarten", "fixtures/saddle.ron", "--iterations", "1", "-q"]);
     command.arg("-o").arg(lab.folder.join("state.ron"));
     command.arg("--checkpoint").arg(lab.folder.join("state.json"));
+    command.arg("--metrics").arg(lab.folder.join("metrics.json"));
     check(command)
 }

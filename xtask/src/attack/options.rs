@@ -13,6 +13,7 @@ const BASES: &[&str] = &[
     "asymptotic fixtures/asymptotic/catenoid.ron",
     "fair fixtures/quads/cube.obj --levels 0 --iterations 2",
     "fit fixtures/grid.obj",
+    "remesh fixtures/triangles/enneper-3.obj --faces 60",
     "convert fixtures/quads/cube.obj",
 ];
 const EXTREMES: &[&str] = &[

@@ -26,6 +26,7 @@ const MODELS: &[&str] = &[
     "fixtures/quads/cube.obj",
     "fixtures/quads/theta-4.obj",
     "fixtures/nets/scherk.obj",
+    "fixtures/triangles/enneper-3.obj",
     "fixtures/grid.obj",
     "fixtures/hard",
     "fixtures/tube.ron",
@@ -47,6 +48,7 @@ const MESHES: &[&str] = &[
     "fair {file} --levels 0 --iterations 2",
     "fair {file} --levels 1 --iterations 1 --method lbfgs",
     "fit {file}",
+    "remesh {file} --faces 60",
 ];
 
 /// Option files that are written here, with the command that reads them.
@@ -103,6 +105,8 @@ pub(super) fn all(folder: &Path) -> Outcome<Vec<Target>> {
     }
     let line = "weingarten fixtures/saddle.ron --iterations 2 --resume {file}";
     targets.push(Target { seed: folder.join("state.json"), line, writes: Some("ron") });
+    let line = "verify {file}";
+    targets.push(Target { seed: folder.join("metrics.json"), line, writes: None });
     Ok(targets)
 }
 

@@ -10,9 +10,9 @@ use crate::outcome::{Outcome, Status};
 use crate::report_support;
 use crate::report_support::weingarten::weingarten_report;
 use crate::watch::Watch;
-use bspline::{Flaw, FlawKind, Trim};
+use bspline::{BsplineSurface, Flaw, FlawKind, Trim};
 use exchange::{LengthUnit, Model, NamedSurface};
-use gp_solver::{OptionValue, SolverError};
+use gp_solver::{Counts, OptionValue, SolverError};
 use serde::Serialize;
 use std::path::PathBuf;
 use weingarten::{
@@ -90,6 +90,7 @@ impl Weingarten {
             let nets: Vec<String> = options.levels.iter().map(ToString::to_string).collect();
             outcome.summary.push(format!("  levels chosen        {}", nets.join(", ")));
         }
+        outcome.warnings.extend(start.and_then(|s| refit_warning(&s, &options, &named.surface)));
         outcome.warnings.extend(model.warnings);
         self.ending.apply(&mut outcome);
         if !watch.finish(&mut outcome) {
@@ -250,6 +251,20 @@ fn ending(solution: &Solution) -> String {
         }
         _ => status.as_str().replace('_', " "),
     }
+}
+
+/// A start that is not on the first net is refitted to it, which is seldom what was meant.
+fn refit_warning(
+    start: &BsplineSurface,
+    options: &Options,
+    input: &BsplineSurface,
+) -> Option<String> {
+    let own = Counts { u: start.n_u(), v: start.n_v() };
+    let given = Counts { u: input.n_u(), v: input.n_v() };
+    let first = options.levels.first().copied().unwrap_or(given);
+    (own != first).then(|| {
+        format!("the start has {own} control points and was refitted to {first}; name its own net first with --levels {own} to go on from it")
+    })
 }
 
 /// What is wrong with the result, and what to do about it.

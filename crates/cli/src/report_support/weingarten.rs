@@ -4,9 +4,11 @@ use super::energies::energy_history;
 use super::jets::spline_view;
 use crate::failure::{Failure, refused};
 use crate::report_support::mesh::mesh_view;
+use bspline::BsplineSurface;
 use exchange::{NamedSurface, face_mesh};
+use geom_core::DVec3;
 use gp_solver::Counts;
-use report::{RelationCurve, Report, ScalarField, SurfaceView};
+use report::{LineRole, LineSet, RelationCurve, Report, ScalarField, SurfaceView};
 use weingarten::{Metrics, Options, Relation, RelationLocus, Solution};
 
 /// The surface before and after with its deviation, the energies, and the options in force.
@@ -28,7 +30,7 @@ pub(crate) fn weingarten_report(
     } else {
         report.stages.push(spline_view("before", &[input], None, length_unit)?);
         let after = spline_view("after", &[&solution.result], Some(&[input]), length_unit)?;
-        report.stages.push(with_misses(after, solution)?);
+        report.stages.push(with_flaws(with_misses(after, solution)?, input, solution)?);
     }
     let levels = solution.report.stages.iter().map(|l| (l.stage.name.clone(), &l.solver));
     report.energies = Some(energy_history(levels));
@@ -54,6 +56,35 @@ fn with_misses(view: SurfaceView, solution: &Solution) -> Result<SurfaceView, Fa
     let label = "relation missed, of the curvatures";
     let field = ScalarField::magnitude("relation-miss", label, "%", percent);
     view.with_field(field).map_err(refused)
+}
+
+/// The view with a cross at every check point where the result is torn or folded, as wide as the
+/// grid it was looked at on.
+fn with_flaws(
+    view: SurfaceView,
+    input: &BsplineSurface,
+    solution: &Solution,
+) -> Result<SurfaceView, Failure> {
+    if solution.flaws.is_empty() {
+        return Ok(view);
+    }
+    let of = &solution.result;
+    let [u, v] = input.check_parameters();
+    let half = [u, v].map(|at| 0.5 * (at[1] - at[0]));
+    let domains = [of.knots_u().domain(), of.knots_v().domain()];
+    let around = |at: f64, k: usize| {
+        [-half[k], half[k]].map(|by| (at + by).clamp(domains[k].0, domains[k].1))
+    };
+    let crosses = solution.flaws.iter().flat_map(|flaw| {
+        let along = around(flaw.u, 0).map(|u| of.point(u, flaw.v));
+        let across = around(flaw.v, 1).map(|v| of.point(flaw.u, v));
+        [along.to_vec(), across.to_vec()]
+    });
+    let lines: Vec<Vec<DVec3>> =
+        crosses.filter(|line| line.iter().all(|p| p.is_finite())).collect();
+    let label = "torn or folded between the samples";
+    let lines = LineSet { visible: true, ..LineSet::new("flaws", label, LineRole::Curves, lines) };
+    view.with_lines(lines).map_err(refused)
 }
 
 /// The relation over the curvatures of both surfaces.
