@@ -313,8 +313,7 @@ mod tests {
     fn a_grid_read_from_another_corner_has_the_same_surface() {
         let (n_u, n_v) = (23, 17);
         let points = wave(n_u, n_v);
-        let options =
-            GridFitOptions { control_points: Some((9, 8)), ..GridFitOptions::default() };
+        let options = GridFitOptions { control_points: Some((9, 8)), ..GridFitOptions::default() };
         let fit = fit_grid(&points, n_u, n_v, false, &options).unwrap();
         let turned: Vec<DVec3> = points.iter().rev().copied().collect();
         let other = fit_grid(&turned, n_u, n_v, false, &options).unwrap();

@@ -1,5 +1,6 @@
 //! A small piece of surface fitted to points around a place.
 
+use crate::worst_direction::{self, Pairs, add_pairs};
 use glam::DVec3;
 use numerics::least_squares;
 
@@ -17,9 +18,9 @@ pub(crate) struct HeightFit {
     pub(crate) slope: [f64; 2],
     /// `c`, `d` and `e`.
     pub(crate) curvature: [f64; 3],
-    /// How much the curvature terms magnify an error of the heights: the largest row norm of the
-    /// inverse of the triangle, its columns of length one. 1 where all terms are orthogonal, and
-    /// without bound where the points cannot tell them apart.
+    /// How much the curvature terms magnify an error of the heights, in the worst direction and with
+    /// its column made of length one. 1 where all terms are orthogonal, and without bound where the
+    /// points cannot tell them apart.
     pub(crate) gain: f64,
 }
 
@@ -35,9 +36,11 @@ impl HeightFit {
         let mut matrix = Vec::with_capacity(points.len() * terms);
         let mut heights = Vec::with_capacity(points.len());
         let mut row = [0.0; TERMS[4]];
+        let mut moments = Pairs::default();
         for p in points {
             let weight = 1.0 / p.length().max(1e-3);
             monomials(p.x, p.y, &mut row);
+            add_pairs(&mut moments, [2, 3, 4].map(|k| weight * row[k]));
             matrix.extend(row[..terms].iter().map(|value| weight * value));
             heights.push(weight * p.z);
         }
@@ -55,7 +58,7 @@ impl HeightFit {
         Some(Self {
             slope: [value(0), value(1)],
             curvature: [value(2), value(3), value(4)],
-            gain: gain(&matrix, terms),
+            gain: worst_direction::gain(&covariance(&matrix, terms, &lengths), &moments),
         })
     }
 }
@@ -81,20 +84,20 @@ fn monomials(x: f64, y: f64, out: &mut [f64; TERMS[4]]) {
     ];
 }
 
-/// Largest norm of the curvature terms' rows of the inverse of an upper triangle.
-fn gain(triangle: &[f64], terms: usize) -> f64 {
-    let mut norms = [0.0; CURVATURE_TERMS.end];
+/// Covariance of the curvature terms for heights of standard deviation 1, from an upper triangle
+/// whose columns have been divided by `lengths`.
+fn covariance(triangle: &[f64], terms: usize, lengths: &[f64]) -> Pairs {
+    let mut sum = Pairs::default();
     let mut column = [0.0; TERMS[4]];
     for c in CURVATURE_TERMS.start..terms {
+        column.fill(0.0);
         for i in (CURVATURE_TERMS.start..=c).rev() {
             let known: f64 = (i + 1..=c).map(|k| triangle[i * terms + k] * column[k]).sum();
             column[i] = (f64::from(u8::from(i == c)) - known) / triangle[i * terms + i];
         }
-        for i in CURVATURE_TERMS.start..CURVATURE_TERMS.end.min(c + 1) {
-            norms[i] += column[i] * column[i];
-        }
+        add_pairs(&mut sum, [2, 3, 4].map(|i| column[i] / lengths[i]));
     }
-    norms.iter().fold(0.0_f64, |largest, n| largest.max(*n)).sqrt()
+    sum
 }
 
 #[cfg(test)]

@@ -25,6 +25,7 @@ mod spread;
 mod third_order;
 mod torus_fit;
 mod tri_mesh;
+mod worst_direction;
 
 pub use bounding_box::BoundingBox;
 pub use budget::{Amount, Budget, BudgetError, Cost};

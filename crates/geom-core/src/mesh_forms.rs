@@ -1,6 +1,7 @@
 //! Second fundamental forms of a triangle mesh at a length of one's choice.
 
 use crate::tri_mesh::TriMesh;
+use crate::worst_direction::{self, Pairs, add_pairs};
 use glam::{DMat3, DVec3};
 use numerics::least_squares;
 use rayon::prelude::*;
@@ -192,17 +193,19 @@ impl<'m> Around<'m> {
         let terms = if near.len() >= CUBIC_POINTS { CUBIC } else { QUADRATIC };
         let mut matrix = Vec::with_capacity(near.len() * terms);
         let mut heights = Vec::with_capacity(near.len());
+        let mut moments = Pairs::default();
         for &w in &near {
             let d = (points[w] - points[v]) / radius;
             let (s, t, z, weight) = (d.dot(x), d.dot(y), d.dot(normal), weight(w));
             let (ss, st, tt) = (s * s, s * t, t * t);
             let row = [1.0, s, t, 0.5 * ss, st, 0.5 * tt, ss * s, ss * t, s * tt, tt * t];
             matrix.extend(row[..terms].iter().map(|value| weight * value));
+            add_pairs(&mut moments, [row[3], row[4], row[5]].map(|value| weight * value));
             heights.push(weight * z);
         }
         least_squares(&mut matrix, terms, &mut heights, 1).ok()?;
-        let (deviation, gain) = magnification(&matrix, terms);
-        if gain > MOST_GAIN {
+        let covariance = covariance(&matrix, terms);
+        if !(worst_direction::gain(&covariance, &moments) <= MOST_GAIN) {
             return None;
         }
         let left: f64 = heights[terms..].iter().map(|r| r * r).sum();
@@ -223,33 +226,26 @@ impl<'m> Around<'m> {
         let tensor = outer(dual_x, dual_x) * l
             + (outer(dual_x, dual_y) + outer(dual_y, dual_x)) * m
             + outer(dual_y, dual_y) * n;
-        let deviation = noise * deviation / radius;
+        let deviation = noise * worst_direction::deviation(&covariance) / radius;
         Some(VertexForm { normal: fitted, tensor, deviation, radius })
     }
 }
 
-/// How much the curvature terms magnify an error of the heights: the largest norm of their rows of
-/// the inverse of an upper triangle, as it is and with the columns made of length one.
-fn magnification(triangle: &[f64], terms: usize) -> (f64, f64) {
+/// Covariance of the curvature terms for heights of standard deviation 1: their rows of the inverse
+/// of an upper triangle, times themselves.
+fn covariance(triangle: &[f64], terms: usize) -> Pairs {
     let curvature = 3..6;
-    let mut norms = [0.0; 6];
+    let mut sum = Pairs::default();
     let mut column = [0.0; CUBIC];
     for c in curvature.start..terms {
+        column.fill(0.0);
         for i in (curvature.start..=c).rev() {
             let known: f64 = (i + 1..=c).map(|k| triangle[i * terms + k] * column[k]).sum();
             column[i] = (f64::from(u8::from(i == c)) - known) / triangle[i * terms + i];
         }
-        for i in curvature.start..curvature.end.min(c + 1) {
-            norms[i] += column[i] * column[i];
-        }
+        add_pairs(&mut sum, [column[3], column[4], column[5]]);
     }
-    let (mut plain, mut scaled) = (0.0_f64, 0.0_f64);
-    for i in curvature {
-        let length: f64 = (0..=i).map(|k| triangle[k * terms + i].powi(2)).sum();
-        plain = plain.max(norms[i].sqrt());
-        scaled = scaled.max((norms[i] * length).sqrt());
-    }
-    (plain, scaled)
+    sum
 }
 
 #[cfg(test)]

@@ -53,12 +53,15 @@ pub(crate) fn tangent_fields(
 fn normal_fields(normals: &[DVec3], n: usize) -> FieldSpace {
     let m = normals.len() - 1;
     let unknowns = 3 * (n + 1);
+    // Rows of the products stand beside rows of ones, so they must not grow with the model.
+    let size = normals.iter().map(|n| n.abs().max_element()).fold(0.0, f64::max);
+    let size = if size > 0.0 { size } else { 1.0 };
     let mut products = vec![vec![0.0; unknowns]; n + m + 1];
     for k in 0..=n {
         for (i, normal) in normals.iter().enumerate() {
             let share = binomial(n, k) * binomial(m, i) / binomial(n + m, k + i);
             for (axis, c) in normal.to_array().into_iter().enumerate() {
-                products[k + i][3 * k + axis] = share * c;
+                products[k + i][3 * k + axis] = share * (c / size);
             }
         }
     }
