@@ -49,6 +49,17 @@ impl Lab {
         self.folder.join("out").join(name).display().to_string()
     }
 
+    /// Adds to a command line where it writes, as the command wants that named.
+    pub(super) fn name_output(&self, arguments: &mut Vec<String>, name: &str) {
+        let is_named = match arguments.first().map_or("", String::as_str) {
+            "analyze" | "verify" => return,
+            "convert" => false,
+            _ => true,
+        };
+        arguments.extend(is_named.then(|| "-o".to_owned()));
+        arguments.push(self.out(name));
+    }
+
     /// Runs the program and notes what is wrong about how it ended; `hostile` is the input to keep
     /// then.
     pub(super) fn attempt(&mut self, arguments: &[String], hostile: Option<&Path>) -> Outcome {

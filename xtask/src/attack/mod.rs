@@ -59,7 +59,7 @@ fn mutation_of(target: &targets::Target, lab: &mut Lab, random: &mut Random) -> 
     let mut arguments: Vec<String> =
         target.line.split(' ').map(|word| word.replace(targets::HOSTILE, &name)).collect();
     if let Some(extension) = target.writes {
-        arguments.extend(["-o".to_owned(), lab.out(&format!("a.{extension}"))]);
+        lab.name_output(&mut arguments, &format!("a.{extension}"));
         arguments.extend(["--metrics".to_owned(), lab.out("a.json")]);
     }
     lab.attempt(&arguments, Some(&path))

@@ -68,7 +68,7 @@ pub(super) fn attempt(lab: &mut Lab, random: &mut Random, known: &Known) -> Outc
         // As one word, so that a value may begin with a minus.
         arguments.push(format!("{option}={}", random.one(EXTREMES)));
     }
-    arguments.extend(["-o".to_owned(), lab.out("a.obj")]);
+    lab.name_output(&mut arguments, "a.obj");
     lab.attempt(&arguments, None)
 }
 

@@ -44,8 +44,8 @@ pub(super) fn threads(lab: &mut Lab, random: &mut Random) -> Outcome {
     let mut first: Option<Vec<u8>> = None;
     for count in THREADS {
         let mut arguments: Vec<String> = line.split(' ').map(str::to_owned).collect();
-        arguments.extend(["-o".to_owned(), lab.out(name), "--threads".to_owned()]);
-        arguments.push((*count).to_owned());
+        lab.name_output(&mut arguments, name);
+        arguments.extend(["--threads".to_owned(), (*count).to_owned()]);
         lab.attempt(&arguments, None)?;
         let bytes = fs::read(lab.out(name)).unwrap_or_default();
         match &first {
@@ -63,7 +63,7 @@ pub(super) fn threads(lab: &mut Lab, random: &mut Random) -> Outcome {
 pub(super) fn kill(lab: &mut Lab, random: &mut Random) -> Outcome {
     let (line, name) = random.one(LINES);
     let mut arguments: Vec<String> = line.split(' ').map(str::to_owned).collect();
-    arguments.extend(["-o".to_owned(), lab.out(name)]);
+    lab.name_output(&mut arguments, name);
     lab.attempt(&arguments, None)?;
     let new = fs::read(lab.out(name)).unwrap_or_default();
     let old = b"what was there before";
@@ -92,9 +92,7 @@ pub(super) fn interrupt(lab: &mut Lab, random: &mut Random) -> Outcome {
     let report = lab.out("report.html");
     let mut arguments: Vec<String> =
         line.split(' ').map(|word| word.replace("{report}", &report)).collect();
-    if !line.starts_with("analyze") {
-        arguments.extend(["-o".to_owned(), lab.out(name)]);
-    }
+    lab.name_output(&mut arguments, name);
     let mut child = started(&arguments)?;
     thread::sleep(Duration::from_micros(random.below(1_500_000) as u64));
     let sent = Command::new("kill").args(["-INT", &child.id().to_string()]).output();
@@ -128,7 +126,7 @@ pub(super) fn interrupt(lab: &mut Lab, random: &mut Random) -> Outcome {
 pub(super) fn race(lab: &mut Lab, random: &mut Random) -> Outcome {
     let (line, name) = random.one(LINES);
     let mut arguments: Vec<String> = line.split(' ').map(str::to_owned).collect();
-    arguments.extend(["-o".to_owned(), lab.out(name)]);
+    lab.name_output(&mut arguments, name);
     lab.attempt(&arguments, None)?;
     let length = fs::metadata(lab.out(name)).map_or(0, |m| m.len());
     let mut both = [started(&arguments)?, started(&arguments)?];

@@ -54,9 +54,7 @@ pub(super) fn all(lab: &mut Lab) -> Outcome {
         fs::write(&path, bytes).map_err(|e| format!("{}: {e}", path.display()))?;
         for command in COMMANDS {
             let mut arguments = vec![(*command).to_owned(), path.display().to_string()];
-            if *command != "analyze" {
-                arguments.extend(["-o".to_owned(), lab.out("a.obj")]);
-            }
+            lab.name_output(&mut arguments, "a.obj");
             if *command == "fair" {
                 arguments.extend(["--levels", "0", "--iterations", "1"].map(str::to_owned));
             }
@@ -66,9 +64,7 @@ pub(super) fn all(lab: &mut Lab) -> Outcome {
     for no_file in ["fixtures", "/dev/null", "no-such-file.obj", "", "-"] {
         for command in COMMANDS {
             let mut arguments = vec![(*command).to_owned(), no_file.to_owned()];
-            if *command != "analyze" {
-                arguments.extend(["-o".to_owned(), lab.out("a.obj")]);
-            }
+            lab.name_output(&mut arguments, "a.obj");
             lab.attempt(&arguments, None)?;
         }
     }
