@@ -10,8 +10,8 @@ use std::path::{Path, PathBuf};
 const AREA_AGREEMENT: f64 = 1e-6;
 /// The same of volumes.
 const VOLUME_AGREEMENT: f64 = 1e-6;
-/// Largest difference of bounding boxes, as a share of their diagonal: ours is that of samples.
-const BOX_AGREEMENT: f64 = 5e-3;
+/// Largest difference of bounding boxes, as a share of their diagonal.
+const BOX_AGREEMENT: f64 = 1e-6;
 /// Files with the number of faces whose area Open CASCADE misses by more, as closed forms show: a
 /// sphere without two segments and an extrusion (tests of the crate `exchange`), and a sphere with a
 /// circular hole.
