@@ -67,7 +67,8 @@ mod tests {
         for valence in [3, 5, 6, 9] {
             let map = Straightened::new(valence);
             let end = map.chart.point([1.0, 0.0]).0[0];
-            for k in 0..=8 {
+            assert_eq!(map.parameters([0.0, 0.0]), [0.0, 0.0]);
+            for k in 1..=8 {
                 let t = f64::from(k) / 8.0;
                 let [u, v] = map.parameters([t, 0.0]);
                 assert_close(map.chart.point([u, v]).0[0], t * end, 1e-9);
