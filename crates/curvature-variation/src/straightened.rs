@@ -37,15 +37,13 @@ impl Straightened {
             return [0.0, 0.0];
         }
         let near = size.powf(self.power);
-        let guess = [near * u / size, near * v / size];
         // Both edges alike, to the last bit.
-        if v == 0.0 {
-            return [self.chart.inverse(self.place([u, 0.0]), guess)[0], 0.0];
+        let along = |t| self.chart.inverse(self.place([t, 0.0]), [near, 0.0])[0];
+        match (u == 0.0, v == 0.0) {
+            (_, true) => [along(u), 0.0],
+            (true, _) => [0.0, along(v)],
+            _ => self.chart.inverse(self.place([u, v]), [near * u / size, near * v / size]),
         }
-        if u == 0.0 {
-            return [0.0, self.chart.inverse(self.place([v, 0.0]), [near, 0.0])[0]];
-        }
-        self.chart.inverse(self.place([u, v]), guess)
     }
 
     /// The place in the characteristic map.
