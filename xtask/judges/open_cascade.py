@@ -3,17 +3,20 @@
 usage: open_cascade.py FILE [SAMPLES]
 
 Prints {"roots": n, "valid": bool, "solids": n, "shells": n, "edges": n, "open_edges": n,
-"volume": .., "box": [x0, y0, z0, x1, y1, z1], "faces": [{"area": .., "domain": [u0, u1, v0, v1],
-"samples": [[u, v, x, y, z, K, H], ..]}]}; the grid includes both ends of both parameters. Edges
-without length are not counted; open ones have one face.
+"kink": .., "volume": .., "box": [x0, y0, z0, x1, y1, z1], "faces": [{"area": .., "domain":
+[u0, u1, v0, v1], "samples": [[u, v, x, y, z, K, H], ..]}]}; the grid includes both ends of both
+parameters. Edges without length are not counted; open ones have one face. The kink is the largest
+angle in degrees between the normals of two faces at places along the edge they share.
 Lengths are millimetres, as Open CASCADE converts them.
 """
 
 import json
+import math
 import sys
 
 from OCP.Bnd import Bnd_Box
 from OCP.BRep import BRep_Tool
+from OCP.BRepAdaptor import BRepAdaptor_Curve
 from OCP.BRepBndLib import BRepBndLib
 from OCP.BRepCheck import BRepCheck_Analyzer
 from OCP.BRepGProp import BRepGProp
@@ -21,7 +24,13 @@ from OCP.GeomLProp import GeomLProp_SLProps
 from OCP.GProp import GProp_GProps
 from OCP.IFSelect import IFSelect_RetDone
 from OCP.STEPControl import STEPControl_Reader
-from OCP.TopAbs import TopAbs_EDGE, TopAbs_FACE, TopAbs_SHELL, TopAbs_SOLID
+from OCP.TopAbs import (
+    TopAbs_EDGE,
+    TopAbs_FACE,
+    TopAbs_REVERSED,
+    TopAbs_SHELL,
+    TopAbs_SOLID,
+)
 from OCP.TopExp import TopExp, TopExp_Explorer
 from OCP.TopoDS import TopoDS
 from OCP.TopTools import (
@@ -55,16 +64,47 @@ def count(shape, kind):
     return found.Extent()
 
 
+# Places along an edge at which the faces beside it are compared.
+PLACES = 9
+
+
+def normal_at(edge, face, t):
+    """The outer normal of a face at a parameter of its edge; nothing at a pole."""
+    at = BRep_Tool.CurveOnSurface_s(edge, face, 0.0, 0.0).Value(t)
+    properties = GeomLProp_SLProps(BRep_Tool.Surface_s(face), at.X(), at.Y(), 1, 1e-12)
+    if not properties.IsNormalDefined():
+        return None
+    normal = properties.Normal()
+    return normal.Reversed() if face.Orientation() == TopAbs_REVERSED else normal
+
+
+def kink_of(edge, faces):
+    curve = BRepAdaptor_Curve(edge)
+    start, end = curve.FirstParameter(), curve.LastParameter()
+    worst = 0.0
+    for k in range(1, PLACES + 1):
+        t = start + (end - start) * k / (PLACES + 1)
+        normals = [normal_at(edge, face, t) for face in faces]
+        if None not in normals:
+            worst = max(worst, normals[0].Angle(normals[1]))
+    return math.degrees(worst)
+
+
 def edges_by_faces(shape):
-    """Numbers of edges with length, and of those among them with one face."""
+    """Numbers of edges with length and of those among them with one face, and the largest kink."""
     faces_of = TopTools_IndexedDataMapOfShapeListOfShape()
     TopExp.MapShapesAndAncestors_s(shape, TopAbs_EDGE, TopAbs_FACE, faces_of)
-    edges, open_edges = 0, 0
+    edges, open_edges, kink = 0, 0, 0.0
     for k in range(1, faces_of.Extent() + 1):
-        if not BRep_Tool.Degenerated_s(TopoDS.Edge_s(faces_of.FindKey(k))):
-            edges += 1
-            open_edges += faces_of.FindFromIndex(k).Size() == 1
-    return edges, open_edges
+        edge = TopoDS.Edge_s(faces_of.FindKey(k))
+        if BRep_Tool.Degenerated_s(edge):
+            continue
+        faces = [TopoDS.Face_s(face) for face in faces_of.FindFromIndex(k)]
+        edges += 1
+        open_edges += len(faces) == 1
+        if len(faces) == 2 and not faces[0].IsSame(faces[1]):
+            kink = max(kink, kink_of(edge, faces))
+    return edges, open_edges, kink
 
 
 def volume_of(shape):
@@ -101,7 +141,7 @@ def main():
         faces.append({"area": area_of(face), "domain": domain, "samples": found})
         explorer.Next()
     valid = BRepCheck_Analyzer(shape).IsValid()
-    edges, open_edges = edges_by_faces(shape)
+    edges, open_edges, kink = edges_by_faces(shape)
     found = {
         "roots": roots,
         "valid": valid,
@@ -109,6 +149,7 @@ def main():
         "shells": count(shape, TopAbs_SHELL),
         "edges": edges,
         "open_edges": open_edges,
+        "kink": kink,
         "volume": volume_of(shape) if count(shape, TopAbs_SOLID) > 0 else 0.0,
         "box": box_of(shape),
         "faces": faces,

@@ -2,9 +2,10 @@
 //!
 //! Open CASCADE evaluates every face of a STEP file on a grid of parameters; points, Gaussian and
 //! mean curvature and the areas of faces must agree with our own evaluation of the same file, which
-//! it must find to be one valid shell. geomdl does the same with
-//! points and derivatives of its own format. rhino3dm reads our 3DM files, and we read its own. The
-//! glTF validator must find no error in a GLB file.
+//! it must find to be one valid shell, without kinks where there are to be none and with our volume
+//! where it is closed. geomdl does the same with points and derivatives of its own format. rhino3dm
+//! reads our 3DM files, and we read its own. The glTF validator must find no error in a GLB file, and
+//! ezdxf none in a drawing.
 //! What is not installed is skipped by name.
 
 mod reading;
@@ -14,7 +15,9 @@ mod verdict;
 use self::verdict::{Face, Verdict, ask};
 use crate::shell::{Outcome, build_umbilic, check, root, umbilic};
 use bspline::BsplineSurface;
+use geom_core::DVec3;
 use serde::Deserialize;
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
@@ -23,6 +26,15 @@ use std::process::Command;
 const AGREEMENT: f64 = 1e-8;
 /// Largest relative difference of the areas of a face that counts as agreement.
 const AREA_AGREEMENT: f64 = 1e-6;
+/// The same of volumes.
+const VOLUME_AGREEMENT: f64 = 1e-6;
+/// What the judge of ezdxf prints.
+#[derive(Deserialize)]
+struct Drawing {
+    errors: Vec<String>,
+    layers: BTreeMap<String, usize>,
+}
+
 /// What the judge of geomdl prints of one surface.
 #[derive(Deserialize)]
 struct Derivatives {
@@ -37,10 +49,13 @@ const ORDERS: [(usize, usize); 6] = [(0, 0), (1, 0), (0, 1), (2, 0), (1, 1), (0,
 struct Case {
     name: &'static str,
     arguments: &'static [&'static str],
-    /// Whether `a.step`, `a.json` and `a.glb` are written.
+    /// Whether `a.step`, `a.json`, `a.glb` and `a.dxf` are written.
     step: bool,
     json: bool,
     glb: bool,
+    dxf: bool,
+    /// Largest angle in degrees between neighbouring faces.
+    kink: f64,
     /// Whether all boundaries are asymptotic curves, so that K there must be minus the torsion
     /// squared.
     asymptotic: bool,
@@ -73,7 +88,8 @@ const CASES: &[Case] = &[
         "gridshell of nine patches",
         &["asymptotic", "fixtures/asymptotic/catenoid-grid-3.ron", "-o", "{out}/a.step"],
     )
-    .asymptotic(),
+    .asymptotic()
+    .smooth_to(1e-8),
     // The torsion of its curves is a quotient of two small numbers near the inflections (2e-6 there),
     // so only the surfaces are compared.
     Case::step(
@@ -96,11 +112,13 @@ const CASES: &[Case] = &[
     Case::step(
         "hyperbolic net around a flat point",
         &["hnet", "fixtures/nets/p-disc.obj", "-o", "{out}/a.step"],
-    ),
+    )
+    .smooth_to(1e-8),
     Case::step(
         "hyperbolic net, odd ring",
         &["hnet", "fixtures/nets/catenoid-odd.obj", "-o", "{out}/a.step"],
-    ),
+    )
+    .smooth_to(1e-8),
     Case::json("near-helical surface", &["convert", "fixtures/near-helical.ron", "{out}/a.json"]),
     Case::json("sphere cap, rational", &["convert", "fixtures/sphere-cap.ron", "{out}/a.json"]),
     Case::json("tube, closed", &["convert", "fixtures/tube.ron", "{out}/a.json"]),
@@ -108,6 +126,23 @@ const CASES: &[Case] = &[
     Case::glb(
         "Darboux transform as GLB",
         &["darboux", "fixtures/nets/enneper.obj", "--c", "-0.6", "-o", "{out}/a.glb"],
+    ),
+    Case::step("limit of a cube of tubes", &["convert", "fixtures/quads/cube.obj", "{out}/a.step"])
+        .smooth_to(1e-8),
+    Case::step("faired surface", &["fair", "fixtures/quads/theta.obj", "-o", "{out}/a.step"])
+        .smooth_to(1e-3),
+    Case::dxf(
+        "flat panels",
+        &[
+            "panel",
+            "fixtures/roof.ron",
+            "--panels",
+            "8x6",
+            "--mold-types",
+            "cylinder",
+            "-o",
+            "{out}/a.dxf",
+        ],
     ),
 ];
 
@@ -117,7 +152,7 @@ impl Case {
         arguments: &'static [&'static str],
         [step, json, glb]: [bool; 3],
     ) -> Self {
-        Self { name, arguments, step, json, glb, asymptotic: false }
+        Self { name, arguments, step, json, glb, dxf: false, kink: 180.0, asymptotic: false }
     }
 
     const fn step(name: &'static str, arguments: &'static [&'static str]) -> Self {
@@ -130,6 +165,17 @@ impl Case {
 
     const fn glb(name: &'static str, arguments: &'static [&'static str]) -> Self {
         Self::files(name, arguments, [false, false, true])
+    }
+
+    const fn dxf(name: &'static str, arguments: &'static [&'static str]) -> Self {
+        let mut case = Self::files(name, arguments, [false; 3]);
+        case.dxf = true;
+        case
+    }
+
+    const fn smooth_to(mut self, degrees: f64) -> Self {
+        self.kink = degrees;
+        self
     }
 
     const fn and_glb(mut self) -> Self {
@@ -149,11 +195,13 @@ pub(crate) fn run() -> Outcome {
     let python = python_with("OCP");
     let geomdl = python_with("geomdl");
     let rhino = python_with("rhino3dm");
+    let drawings = python_with("ezdxf");
     let node = node_with_validator();
     for (missing, name, wanted) in [
         (python.is_none(), "Open CASCADE", "a python3 (or UMBILIC_JUDGE_PYTHON) with OCP 7.9.3.1"),
         (rhino.is_none(), "rhino3dm", "a python3 (or UMBILIC_JUDGE_PYTHON) with rhino3dm 8"),
         (geomdl.is_none(), "geomdl", "a python3 (or UMBILIC_JUDGE_PYTHON) with geomdl 5"),
+        (drawings.is_none(), "ezdxf", "a python3 (or UMBILIC_JUDGE_PYTHON) with ezdxf 1"),
         (node.is_none(), "the glTF validator", "node with gltf-validator on NODE_PATH"),
     ] {
         if missing {
@@ -171,7 +219,7 @@ pub(crate) fn run() -> Outcome {
         std::fs::create_dir_all(&out).map_err(|e| format!("{}: {e}", out.display()))?;
         write_files(case, &out)?;
         if let (Some(python), true) = (&python, case.step) {
-            let said = judge_step(python, &out.join("a.step"), case.asymptotic)
+            let said = judge_step(python, &out.join("a.step"), case)
                 .map_err(|e| format!("{}: {e}", case.name))?;
             println!("{}: Open CASCADE agrees: {said}", case.name);
         }
@@ -179,6 +227,11 @@ pub(crate) fn run() -> Outcome {
             let said = judge_json(python, &out.join("a.json"))
                 .map_err(|e| format!("{}: {e}", case.name))?;
             println!("{}: geomdl agrees: {said}", case.name);
+        }
+        if let (Some(python), true) = (&drawings, case.dxf) {
+            let said =
+                judge_dxf(python, &out.join("a.dxf")).map_err(|e| format!("{}: {e}", case.name))?;
+            println!("{}: ezdxf agrees: {said}", case.name);
         }
         if let (Some(node), true) = (&node, case.glb) {
             let mut validator = Command::new(node);
@@ -229,7 +282,7 @@ fn judge_json(python: &Path, file: &Path) -> Outcome<String> {
                 let Some(&[x, y, z]) = rest.as_chunks().0.get(k) else {
                     return Err(format!("a sample without derivative ({a}, {b})"));
                 };
-                let got = geom_core::DVec3::new(x, y, z);
+                let got = DVec3::new(x, y, z);
                 size = size.max(got.length());
                 let jet = surface.jet(u0 + (u1 - u0) * u, v0 + (v1 - v0) * v, 2);
                 let scale = (u1 - u0).powi(a as i32) * (v1 - v0).powi(b as i32);
@@ -248,7 +301,7 @@ fn judge_json(python: &Path, file: &Path) -> Outcome<String> {
 }
 
 /// Compares every sample of every face; returns the largest differences in words.
-fn judge_step(python: &Path, file: &Path, asymptotic: bool) -> Outcome<String> {
+fn judge_step(python: &Path, file: &Path, case: &Case) -> Outcome<String> {
     let verdict = Verdict::of(python, file)?;
     let model = exchange::read_model(file).map_err(|e| e.to_string())?;
     if !verdict.valid || verdict.roots == 0 {
@@ -261,7 +314,7 @@ fn judge_step(python: &Path, file: &Path, asymptotic: bool) -> Outcome<String> {
     let scale = model.unit.metres() * 1e3;
     let mut worst = Differences::default();
     for (face, named) in verdict.faces.iter().zip(&model.surfaces) {
-        worst.merge(&compare(face, &named.surface, scale, asymptotic)?);
+        worst.merge(&compare(face, &named.surface, scale, case.asymptotic)?);
         let ours = named.curvature_statistics().area * scale * scale;
         // Written so that NaN is a disagreement.
         if !((face.area / ours - 1.0).abs() <= AREA_AGREEMENT) {
@@ -272,7 +325,35 @@ fn judge_step(python: &Path, file: &Path, asymptotic: bool) -> Outcome<String> {
     if verdict.shells != 1 {
         return Err(format!("Open CASCADE finds {} shells, one was expected", verdict.shells));
     }
-    worst.check(verdict.faces.len())
+    // Written so that NaN is a disagreement, here and below.
+    if !(verdict.kink <= case.kink) {
+        return Err(format!("kinks of {:.1e} degrees, {:.1e} allowed", verdict.kink, case.kink));
+    }
+    let mut said = worst.check(verdict.faces.len())?;
+    if case.kink < 180.0 {
+        said += &format!(", kinks to {:.1e} degrees", verdict.kink);
+    }
+    if verdict.solids > 0 {
+        let parts = model.surfaces.iter();
+        let volume: f64 = parts.map(|s| s.surface.cone_volume(s.trim.as_ref(), DVec3::ZERO)).sum();
+        let change = (verdict.volume / (volume * scale.powi(3)) - 1.0).abs();
+        if !(change <= VOLUME_AGREEMENT) {
+            return Err(format!("a volume of {}, we measure {volume}", verdict.volume));
+        }
+        said += &format!(", a solid, volume to {change:.1e}");
+    }
+    Ok(said)
+}
+
+/// The layers of a drawing without errors, in words.
+fn judge_dxf(python: &Path, file: &Path) -> Outcome<String> {
+    let said: Drawing = serde_json::from_str(&ask(python, "drawing.py", file)?)
+        .map_err(|e| format!("the judge said: {e}"))?;
+    if let Some(first) = said.errors.first() {
+        return Err(format!("{} errors: {first}", said.errors.len()));
+    }
+    let layers = said.layers.iter().map(|(name, count)| format!("{count} on {name}"));
+    Ok(layers.collect::<Vec<_>>().join(", "))
 }
 
 /// Largest differences, each relative to the largest value on its face.
@@ -317,7 +398,7 @@ fn compare(
         |difference: f64, size: f64| difference.abs() / if size > 0.0 { size } else { 1.0 };
     for &[u, v, x, y, z, gaussian, mean] in &face.samples {
         let jet = surface.jet(u, v, 3);
-        let theirs = geom_core::DVec3::new(x, y, z);
+        let theirs = DVec3::new(x, y, z);
         found.point = found.point.max(relative((jet.position() * scale).distance(theirs), size));
         let our_gaussian = jet.gaussian_curvature().map_err(|e| e.to_string())? / (scale * scale);
         let our_mean = jet.mean_curvature().map_err(|e| e.to_string())? / scale;

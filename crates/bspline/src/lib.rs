@@ -12,6 +12,7 @@ mod crease;
 mod curve;
 mod elementary;
 mod error;
+mod extent;
 mod face;
 mod fit;
 mod grid;

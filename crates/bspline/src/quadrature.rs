@@ -3,6 +3,7 @@
 use crate::knots::KnotVector;
 use crate::pole::SurfaceCurvature;
 use crate::surface::BsplineSurface;
+use crate::trim::Trim;
 use geom_core::{CurvatureStatistics, SurfaceJet};
 use std::ops::Range;
 
@@ -20,6 +21,7 @@ pub(crate) const CELLS: usize = 16;
 /// Statistics of one surface while they are gathered.
 pub(crate) struct CurvatureSamples<'s> {
     pub(crate) statistics: CurvatureStatistics,
+    surface: &'s BsplineSurface,
     // None if the surface leaves the range of `f64` next to a pole.
     curvature: Option<SurfaceCurvature<'s>>,
 }
@@ -27,7 +29,14 @@ pub(crate) struct CurvatureSamples<'s> {
 impl<'s> CurvatureSamples<'s> {
     pub(crate) fn new(surface: &'s BsplineSurface) -> Self {
         let curvature = SurfaceCurvature::new(surface).ok();
-        Self { statistics: CurvatureStatistics::default(), curvature }
+        Self { statistics: CurvatureStatistics::default(), surface, curvature }
+    }
+
+    /// Widens the box to what lies between the samples.
+    pub(crate) fn add_extent(&mut self, trim: Option<&Trim>) {
+        let bounds = self.surface.bounding_box(trim);
+        self.statistics.add_point(bounds.min);
+        self.statistics.add_point(bounds.max);
     }
 
     /// Adds the jet at a parameter pair, which stands for `weight` of area.

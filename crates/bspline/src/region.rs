@@ -288,6 +288,7 @@ impl BsplineSurface {
         for (jet, at) in self.jets(&border, 2).iter().zip(&border) {
             samples.add(*at, jet, 0.0);
         }
+        samples.add_extent(Some(trim));
         samples.statistics
     }
 }

@@ -8,7 +8,8 @@ use geom_core::{CurvatureStatistics, DVec3, SurfaceJet};
 
 impl BsplineSurface {
     /// Area and curvatures of the surface: area and means by Gauss quadrature with 5 x 5 nodes in
-    /// every cell of the knot spans, the extremes over the nodes and over the corners of the cells.
+    /// every cell of the knot spans, the extremes over the nodes and over the corners of the cells,
+    /// the box as [`Self::bounding_box`] finds it.
     /// Poles have the curvature of their surroundings, see [`SurfaceCurvature`](crate::SurfaceCurvature); points without
     /// curvature are counted and left out, with the area they stand for.
     ///
@@ -41,6 +42,7 @@ impl BsplineSurface {
             let at = [ends_u[k / ends_v.len()], ends_v[k % ends_v.len()]];
             samples.add(at, jet, 0.0);
         }
+        samples.add_extent(None);
         samples.statistics
     }
 

@@ -21,6 +21,8 @@
 mod analysis;
 pub mod blocks;
 mod cad;
+mod chart;
+mod chart_net;
 mod checkpoint;
 mod constraints;
 mod density;
@@ -54,6 +56,7 @@ mod solution;
 mod solve;
 mod splines;
 mod status;
+mod straightened;
 mod surface_matrix;
 mod symmetry;
 mod torus;

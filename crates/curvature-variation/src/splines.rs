@@ -1,22 +1,25 @@
 //! A subdivision surface as B-spline surfaces, for CAD.
 
-use bspline::{
-    BsplineSurface, Degree, FitError, KnotError, KnotVector, SplineError, fit_curve, fit_surface,
-};
+use crate::straightened::Straightened;
+use bspline::{BsplineSurface, Degree, FitError, KnotError, KnotVector, SplineError, fit_surface};
 use geom_core::{DVec3, FaceId, Normalization, PolyMesh};
 use rayon::prelude::*;
 use std::collections::BTreeMap;
 use subdiv_catmull_clark::{BasisId, JetWeights, SubdivisionSurface};
 
-const DEGREE: usize = 3;
-/// The knots of a fitted spline halve their distance to a corner that may be extraordinary this
+/// Degree of the patches that are exact, and of those at creases.
+const CUBIC: usize = 3;
+/// Degree of the patches of a blend: third derivatives of a cubic are constant on every span, so
+/// that its energies of third order would be those of ripples.
+const QUINTIC: usize = 5;
+/// Spans in each direction of a patch of a blend of several rings, and of one ring.
+const SPANS: [usize; 2] = [8, 16];
+/// The knots of a patch at a crease halve their distance to a corner that may be extraordinary this
 /// often: the surface is smooth there, but its parametrisation behaves like a power of the
 /// distance.
 const OCTAVES: i32 = 8;
 /// Spans between a knot and the one at half its distance.
 const SPANS_PER_OCTAVE: u32 = 4;
-/// Spans of a fitted spline of a patch that is smooth everywhere.
-const SMOOTH_SPANS: usize = 8;
 /// Parameters per control point and direction at which the distance to the surface is taken.
 const CHECKS: usize = 2;
 
@@ -47,14 +50,13 @@ pub enum SplinePatchError {
 
 /// Turns every patch into a spline surface over the unit square.
 ///
-/// Bi-cubic patches are given exactly, as Bézier patches. A patch at an extraordinary vertex or a
-/// semi-sharp crease is no polynomial; it becomes a bi-cubic spline through the points at the
-/// Greville parameters of knots that crowd together towards the vertex, four spans to an octave.
-/// The other patches of a blend of several rings are smooth, and eight equal spans do. Two
-/// neighbours interpolate the same points of their common edge with the same knots, but for those of
-/// a patch at the vertex which it shares with a smooth one: there it takes over the other's edge,
-/// whose knots are among its own. The outer edges of a blend are cubic, which interpolation
-/// reproduces; so there are no gaps between the surfaces.
+/// Bi-cubic patches are given exactly, as Bézier patches. The patches of a blend become quintic
+/// splines over equal spans through the points at their Greville parameters; at the vertex in
+/// parameters that run evenly along the edges of the sector in the characteristic map, in which the
+/// patch is as smooth as the surface is. Two neighbours interpolate the same points of their common
+/// edge with the same knots, and the outer edges of a blend are cubic, which interpolation
+/// reproduces; so there are no gaps between the surfaces. A patch at a semi-sharp crease is a
+/// bi-cubic spline with knots that crowd together towards its corners, four spans to an octave.
 ///
 /// # Errors
 /// [`SplinePatchError`] if a control point is not finite.
@@ -62,12 +64,12 @@ pub fn spline_patches(
     mesh: &PolyMesh,
     surface: &SubdivisionSurface,
 ) -> Result<SplinePatches, SplinePatchError> {
-    let degree = Degree::new(DEGREE)?;
-    let bezier_knots = KnotVector::clamped_uniform(degree, 4)?;
+    let bezier_knots = KnotVector::clamped_uniform(Degree::new(CUBIC)?, CUBIC + 1)?;
     let mut rules: BTreeMap<BasisId, FittedRule> = BTreeMap::new();
     for patch in surface.patches() {
         if surface.b_spline_grid(patch.basis).is_none() && !rules.contains_key(&patch.basis) {
-            rules.insert(patch.basis, FittedRule::new(surface, patch.basis)?);
+            let valence = mesh.valence(mesh.origin(patch.corner));
+            rules.insert(patch.basis, FittedRule::new(surface, patch.basis, valence)?);
         }
     }
     // Far from the origin fits and distances would lose digits.
@@ -104,67 +106,46 @@ pub(crate) struct FittedRule {
     checks: Vec<f64>,
     at_nodes: Vec<JetWeights>,
     at_checks: Vec<JetWeights>,
-    edges: Option<OuterEdges>,
-}
-
-/// The edges `u = 1` and `v = 1` of a patch at the vertex of a blend of several rings.
-struct OuterEdges {
-    knots: KnotVector,
-    nodes: Vec<f64>,
-    at_nodes: [Vec<JetWeights>; 2],
-}
-
-impl OuterEdges {
-    fn new(surface: &SubdivisionSurface, basis: BasisId) -> Result<Self, SplinePatchError> {
-        let knots = smooth_knots()?;
-        let nodes = knots.greville_points();
-        let at_nodes = [
-            nodes.iter().map(|&t| surface.weights(basis, 1.0, t)).collect(),
-            nodes.iter().map(|&t| surface.weights(basis, t, 1.0)).collect(),
-        ];
-        Ok(Self { knots, nodes, at_nodes })
-    }
-}
-
-fn smooth_knots() -> Result<KnotVector, KnotError> {
-    KnotVector::clamped_uniform(Degree::new(DEGREE)?, DEGREE + SMOOTH_SPANS)
 }
 
 impl FittedRule {
+    /// Of the patches of a basis whose corner at `(0, 0)` has `valence` edges.
     pub(crate) fn new(
         surface: &SubdivisionSurface,
         basis: BasisId,
+        valence: usize,
     ) -> Result<Self, SplinePatchError> {
-        let edges = if surface.is_wide(basis) && !surface.is_smooth(basis) {
-            Some(OuterEdges::new(surface, basis)?)
+        let at_vertex = surface.is_blended(basis);
+        let knots = if at_vertex || surface.is_smooth(basis) {
+            let spans = SPANS[usize::from(!surface.is_wide(basis))];
+            KnotVector::clamped_uniform(Degree::new(QUINTIC)?, QUINTIC + spans)?
         } else {
-            None
-        };
-        let knots = if surface.is_smooth(basis) {
-            smooth_knots()?
-        } else {
+            // Any corner of a patch at a crease can be extraordinary.
             let mut inner = graded_breaks();
-            if !surface.is_blended(basis) {
-                // Any corner of a patch at a crease can be extraordinary.
-                inner.retain(|&t| t <= 0.5);
-                let mirrored: Vec<f64> =
-                    inner.iter().rev().filter(|&&t| t < 0.5).map(|t| 1.0 - t).collect();
-                inner.extend(mirrored);
-            }
-            let mut knots = vec![0.0; DEGREE + 1];
+            inner.retain(|&t| t <= 0.5);
+            let mirrored: Vec<f64> =
+                inner.iter().rev().filter(|&&t| t < 0.5).map(|t| 1.0 - t).collect();
+            inner.extend(mirrored);
+            let mut knots = vec![0.0; CUBIC + 1];
             knots.extend(inner);
-            knots.extend([1.0; DEGREE + 1]);
-            KnotVector::new(Degree::new(DEGREE)?, knots)?
+            knots.extend([1.0; CUBIC + 1]);
+            KnotVector::new(Degree::new(CUBIC)?, knots)?
         };
         let nodes = knots.greville_points();
         let checks = knots.uniform_parameters(CHECKS * knots.control_count());
+        let straightened = at_vertex.then(|| Straightened::new(valence));
         let weights = |t: &[f64]| -> Vec<JetWeights> {
+            let at = |u: f64, v: f64| {
+                let place = straightened.as_ref().map_or([u, v], |map| map.parameters([u, v]));
+                surface.weights(basis, place[0], place[1])
+            };
             t.par_iter()
-                .flat_map_iter(|&u| t.iter().map(move |&v| surface.weights(basis, u, v)))
+                .flat_map_iter(|&u| t.iter().map(move |&v| (u, v)))
+                .map(|(u, v)| at(u, v))
                 .collect()
         };
         let (at_nodes, at_checks) = (weights(&nodes), weights(&checks));
-        Ok(Self { knots, nodes, checks, at_nodes, at_checks, edges })
+        Ok(Self { knots, nodes, checks, at_nodes, at_checks })
     }
 
     pub(crate) fn fit(
@@ -174,19 +155,7 @@ impl FittedRule {
         let point = |weights: &JetWeights| -> DVec3 {
             weights.row(0).iter().enumerate().map(|(k, &w)| w * control(k)).sum()
         };
-        let mut points: Vec<DVec3> = self.at_nodes.iter().map(point).collect();
-        if let Some(edges) = &self.edges {
-            let count = self.nodes.len();
-            for (along_v, weights) in edges.at_nodes.iter().enumerate() {
-                let on_edge: Vec<DVec3> = weights.iter().map(point).collect();
-                let curve = fit_curve(&edges.knots, &edges.nodes, &on_edge)?;
-                for (k, &t) in self.nodes.iter().enumerate() {
-                    let place =
-                        if along_v == 0 { (count - 1) * count + k } else { k * count + count - 1 };
-                    points[place] = curve.point(t);
-                }
-            }
-        }
+        let points: Vec<DVec3> = self.at_nodes.iter().map(point).collect();
         let fitted = fit_surface(&self.knots, &self.knots, &self.nodes, &self.nodes, &points)?;
         let got = fitted.point_grid(&self.checks, &self.checks);
         let distance = |(weights, got): (&JetWeights, &DVec3)| point(weights).distance(*got);
@@ -226,7 +195,7 @@ mod tests {
             assert!(splines.max_deviation < bound * size, "{blend:?}: {}", splines.max_deviation);
             // Every edge of the mesh, from the surfaces on both of its sides.
             let corners = [(0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0)];
-            let edge = |face: FaceId, from: geom_core::VertexId, t: f64| {
+            let jet = |face: FaceId, from: geom_core::VertexId, t: f64| {
                 let mut at = surface.patches()[face.index()].corner;
                 let mut k = 0;
                 while mesh.origin(at) != from {
@@ -235,13 +204,17 @@ mod tests {
                 }
                 let (a, b): ((f64, f64), (f64, f64)) = (corners[k], corners[(k + 1) % 4]);
                 let (u, v) = (a.0 + t * (b.0 - a.0), a.1 + t * (b.1 - a.1));
-                splines.surfaces[face.index()].1.point(u, v)
+                splines.surfaces[face.index()].1.jet(u, v, 1)
             };
+            let kink = if blend == Blend::Smooth { 1e-4 } else { 0.1 };
             for h in mesh.edges() {
                 let (f, g) = (mesh.face(h).unwrap(), mesh.face(mesh.twin(h)).unwrap());
                 for t in [0.0, 0.013, 0.3, 0.77, 1.0] {
-                    let (p, q) = (edge(f, mesh.origin(h), t), edge(g, mesh.target(h), 1.0 - t));
-                    assert!(p.distance(q) < 1e-10, "{blend:?} {}", p.distance(q));
+                    let (p, q) = (jet(f, mesh.origin(h), t), jet(g, mesh.target(h), 1.0 - t));
+                    let gap = p.position().distance(q.position());
+                    assert!(gap < 1e-10, "{blend:?} {gap}");
+                    let [m, n] = [p, q].map(|jet| jet.d(1, 0).cross(jet.d(0, 1)));
+                    assert!(m.angle_between(n) < kink, "{blend:?} {}", m.angle_between(n));
                 }
             }
         }

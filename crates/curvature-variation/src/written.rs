@@ -183,3 +183,30 @@ fn compared(reported: &EnergyTable, written: &EnergyTable) -> Option<Warning> {
         written: written.get(functional),
     })
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_functional_that_is_farthest_off_is_told_with_both_numbers() {
+        let table = |f1: f64, bending: f64| {
+            let value = |f: &Functional| match f {
+                Functional::F1 => f1,
+                Functional::Bending => bending,
+                _ => 50.0,
+            };
+            EnergyTable::of(Functional::ALL.iter().map(|f| (*f, value(f))).collect())
+        };
+        let reported = table(10.0, 20.0);
+        assert!(compared(&reported, &table(10.29, 20.019)).is_none());
+        let told = compared(&reported, &table(10.4, 20.1));
+        let Some(Warning::WrittenEnergy { functional, reported: r, written }) = told else {
+            panic!("{told:?}")
+        };
+        // Five times what bending may differ by, and a third more than a third derivative may.
+        assert_eq!((functional, r, written), (Functional::Bending, 20.0, 20.1));
+        let told = compared(&reported, &table(12.0, 20.0));
+        assert!(matches!(told, Some(Warning::WrittenEnergy { functional: Functional::F1, .. })));
+    }
+}

@@ -10,12 +10,15 @@ use std::path::{Path, PathBuf};
 const AREA_AGREEMENT: f64 = 1e-6;
 /// The same of volumes.
 const VOLUME_AGREEMENT: f64 = 1e-6;
-/// Largest difference of bounding boxes, as a share of their diagonal: ours is that of samples.
-const BOX_AGREEMENT: f64 = 5e-3;
+/// Largest difference of bounding boxes, as a share of their diagonal.
+const BOX_AGREEMENT: f64 = 1e-6;
 /// Files with the number of faces whose area Open CASCADE misses by more, as closed forms show: a
 /// sphere without two segments and an extrusion (tests of the crate `exchange`), and a sphere with a
 /// circular hole.
 const MISSED: &[(&str, usize)] = &[("sweeps-bare.step", 2), ("abc-0000.step", 1)];
+/// Files whose box Open CASCADE finds too small: a glass turned about an axis is as wide in y as in
+/// x, where both agree.
+const NARROW: &[&str] = &["abc-0000.step"];
 /// Files without a product, in which Open CASCADE finds no shape.
 const BARE: &[&str] = &[
     "analytic-torus.step",
@@ -76,8 +79,12 @@ fn judge_file(python: &Path, file: &Path, name: &str, again: &Path) -> Outcome<S
     let bounds = BoundingBox::of(boxes.flat_map(|b| [b.min * scale, b.max * scale]));
     let bounds = bounds.ok_or("there is nothing to measure")?;
     let corners = [bounds.min.to_array(), bounds.max.to_array()].concat();
-    let apart = corners.iter().zip(&theirs.bounds).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
-    if !(apart <= BOX_AGREEMENT * bounds.diagonal()) {
+    let beyond = |k: usize| {
+        if k < 3 { theirs.bounds[k] - corners[k] } else { corners[k] - theirs.bounds[k] }
+    };
+    let apart = |k: usize| if NARROW.contains(&name) { -beyond(k) } else { beyond(k).abs() };
+    // Written so that NaN is a disagreement.
+    if !(0..6).all(|k| apart(k) <= BOX_AGREEMENT * bounds.diagonal()) {
         return Err(format!("a box of {:?}, we measure {corners:?}", theirs.bounds));
     }
     // What is written again is the same to the judge.

@@ -19,6 +19,8 @@ pub(super) struct Verdict {
     pub(super) edges: usize,
     /// Those of them with one face only.
     pub(super) open_edges: usize,
+    /// Largest angle between the normals of two faces along an edge, degrees.
+    pub(super) kink: f64,
     /// Cubic millimetres; nothing for what is open.
     pub(super) volume: f64,
     /// Lowest and highest corner, millimetres.

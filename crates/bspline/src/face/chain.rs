@@ -14,6 +14,11 @@ const MOST: usize = 2000;
 const JUMP: f64 = 0.25;
 /// How often the piece between two points is halved for that.
 const HALVINGS: usize = 40;
+/// Courses in the parameter plane are this near to their edges, as a share of its size, or are not
+/// taken.
+const EXACT: f64 = 1e-6;
+/// Places at which they are compared.
+const CHECKS: usize = 16;
 /// Ends that differ by less than this share of a period around a pole are one meridian.
 const SAME_MERIDIAN: f64 = 1e-7;
 
@@ -87,6 +92,19 @@ impl Run {
             curve: Some(edge.curve.clone()),
             parameters: Some(parameters.clone()),
             samples,
+        })
+    }
+
+    /// Whether a given course runs along its edge, to what the file calls the same place.
+    fn is_exact(&self, chart: &Chart<'_>) -> bool {
+        let Some(curve) = &self.curve else { return true };
+        let points = curve.control_points();
+        let spread = points.iter().map(|p| p.distance(points[0])).fold(0.0, f64::max);
+        let slack = EXACT * spread + chart.tolerance;
+        let every = self.samples.len().div_ceil(CHECKS);
+        self.samples.iter().step_by(every).chain(self.samples.last()).all(|sample| {
+            let p = chart.point(sample.at);
+            curve.point(curve.closest_parameter(p)).distance(p) <= slack
         })
     }
 
@@ -279,7 +297,9 @@ impl Chain {
                 given.sort_by(|a, b| gap(a).total_cmp(&gap(b)).then(other(a).total_cmp(&other(b))));
             }
             let runs = match given.into_iter().next() {
-                Some(run) => vec![run],
+                Some(run) if run.is_exact(chart) => vec![run],
+                // The edge in space is the better one; if it is not on the surface, this must do.
+                Some(run) => Run::located(&edge.curve, chart).unwrap_or_else(|_| vec![run]),
                 None => Run::located(&edge.curve, chart)?,
             };
             for mut run in runs {

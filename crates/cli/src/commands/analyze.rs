@@ -122,6 +122,9 @@ fn centred(model: &Model) -> (Model, DVec3) {
     let by = -place.center();
     for named in &mut model.surfaces {
         named.surface = named.surface.translated(by);
+        named.trim = named.trim.as_ref().map(|trim| {
+            trim.with_mapped_edges(|p| p + by).unwrap_or_else(|_| trim.without_edges())
+        });
     }
     model.meshes.iter_mut().flat_map(|mesh| &mut mesh.positions).for_each(|p| *p += by);
     model.grids.iter_mut().flat_map(|grid| &mut grid.points).for_each(|p| *p += by);

@@ -12,8 +12,8 @@
 //! subdivision surface by least squares, at places that correspond in the characteristic map: all
 //! of it is linear in the control points and is computed once for a valence.
 
-use super::chart::{Chart, magnified};
-use super::net::{COARSE, FINE, cell, count, cubic, inner, place, refinement, turned};
+use crate::chart::{Chart, magnified};
+use crate::chart_net::{COARSE, FINE, cell, count, cubic, inner, place, refinement, turned};
 use geom_core::DVec3;
 use numerics::{Cholesky, Matrix};
 

@@ -1,14 +1,12 @@
 //! The plain limit surface of a control mesh as B-spline surfaces, for CAD.
 
 mod cap;
-mod chart;
-mod net;
 
+use crate::chart_net::{self, COARSE, FINE, place};
 use crate::splines::{FittedRule, SplinePatchError};
 use bspline::{BsplineSurface, Degree, KnotVector};
 use cap::{CapRule, DEGREE, SIDE};
 use geom_core::{DVec3, FaceId, HalfEdgeId, PolyMesh, VertexId};
-use net::{COARSE, FINE, place};
 use std::collections::BTreeMap;
 use std::collections::btree_map::Entry;
 use subdiv_catmull_clark::{
@@ -227,9 +225,10 @@ impl<'m> Maker<'m> {
     fn add_fitted(&mut self, face: FaceId) -> Result<(), LimitPatchError> {
         let surface = self.surface;
         let patch = &surface.patches()[face.index()];
+        let valence = self.mesh.valence(self.mesh.origin(patch.corner));
         let rule = match self.fits.entry(patch.basis) {
             Entry::Occupied(known) => known.into_mut(),
-            Entry::Vacant(place) => place.insert(FittedRule::new(surface, patch.basis)?),
+            Entry::Vacant(place) => place.insert(FittedRule::new(surface, patch.basis, valence)?),
         };
         let positions = self.mesh.positions();
         let control = |k: usize| positions[patch.controls[k] as usize];
@@ -248,9 +247,9 @@ impl<'m> Maker<'m> {
     }
 }
 
-/// The control points around a vertex with a regular ring of faces, see [`net`].
+/// The control points around a vertex with a regular ring of faces, see [`chart_net`].
 fn local_net(mesh: &PolyMesh, vertex: VertexId, valence: usize) -> Vec<DVec3> {
-    let mut points = vec![mesh.position(vertex); net::count(valence, COARSE)];
+    let mut points = vec![mesh.position(vertex); chart_net::count(valence, COARSE)];
     let Some(first) = mesh.outgoing(vertex) else { return points };
     let mut along = first;
     for sector in 0..valence {

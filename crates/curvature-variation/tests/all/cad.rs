@@ -31,25 +31,26 @@ fn exact_patches_have_the_energies_that_are_reported() {
 }
 
 #[test]
-fn fitted_patches_agree_to_second_order_and_are_warned_about_in_third() {
-    let input = Input::from(quad_graphs::theta_graph(3));
-    let options = Options { levels: 0, iterations: 0, ..Options::default() };
-    let mut solution = solve(&input, &options, &mut ()).unwrap();
-    let splines = spline_patches(&solution.result, &solution.surface).unwrap();
-    solution.add_splines(&splines);
-    let written = solution.metrics.written_energies.clone().unwrap();
-    for functional in [Functional::Area, Functional::Bending, Functional::Willmore] {
-        let value = solution.after.get(functional);
-        assert_close(written[functional.name()] / value, 1.0, 1e-3);
+fn fitted_patches_have_the_energies_that_are_reported() {
+    // One ring of a blend and several, valences three, four and five.
+    for (mesh, levels) in [
+        (quad_graphs::theta_graph(3), 0),
+        (quad_graphs::theta_graph(3), 1),
+        (quad_graphs::theta_graph(5), 1),
+    ] {
+        let options = Options { levels, iterations: 0, ..Options::default() };
+        let mut solution = solve(&Input::from(mesh), &options, &mut ()).unwrap();
+        let splines = spline_patches(&solution.result, &solution.surface).unwrap();
+        solution.add_splines(&splines);
+        let written = solution.metrics.written_energies.clone().unwrap();
+        for functional in Functional::ALL {
+            let second = matches!(functional, Functional::Area | Functional::Bending);
+            let bound = if second { 1e-4 } else { 0.01 };
+            assert_close(written[functional.name()] / solution.after.get(functional), 1.0, bound);
+        }
+        let told = solution.warnings.iter().any(|w| matches!(w, Warning::WrittenEnergy { .. }));
+        assert!(!told, "{:?}", solution.warnings);
     }
-    let told = solution.warnings.iter().find_map(|warning| match warning {
-        Warning::WrittenEnergy { reported, written, .. } => Some((*reported, *written)),
-        _ => None,
-    });
-    let share = |f: Functional| written[f.name()] / solution.after.get(f) - 1.0;
-    let ripples = Functional::ALL.iter().any(|f| share(*f).abs() > 0.03);
-    assert_eq!(told.is_some(), ripples, "{:?}", solution.warnings);
-    assert!(told.is_none_or(|(a, b)| (b / a - 1.0).abs() > 0.03));
 }
 
 /// The vertices of a mesh refined a few times, where the limit surface has them.

@@ -115,16 +115,19 @@ impl<'a> Index<'a> {
 }
 
 /// Bytes that a statement is made of: brackets, quotes, its end, and what a comment begins with.
-const MEANT: [bool; 256] = {
-    let mut meant = [false; 256];
-    let bytes = b"();'\"/";
+const MEANT: [bool; 256] = table(b"();'\"/");
+/// Bytes at which a search for references stops.
+const STOPS: [bool; 256] = table(b"#;'\"/");
+
+const fn table(bytes: &[u8]) -> [bool; 256] {
+    let mut table = [false; 256];
     let mut k = 0;
     while k < bytes.len() {
-        meant[bytes[k] as usize] = true;
+        table[bytes[k] as usize] = true;
         k += 1;
     }
-    meant
-};
+    table
+}
 
 /// A place in the text.
 #[derive(Clone, Debug)]
@@ -162,6 +165,10 @@ impl<'a> Cursor<'a> {
 
     /// Skips blanks and comments.
     fn space(&mut self) {
+        // Most tokens follow one another.
+        if self.peek().is_some_and(|b| b > b' ' && b != b'/') {
+            return;
+        }
         loop {
             while self.peek().is_some_and(|b| b.is_ascii_whitespace()) {
                 self.at += 1;
@@ -274,20 +281,23 @@ impl<'a> Cursor<'a> {
     /// Every `#id` in the statement at the cursor.
     pub(super) fn references(mut self, mut visit: impl FnMut(u64)) {
         loop {
-            self.space();
-            match self.peek() {
-                None | Some(b';') => return,
-                Some(quote @ (b'\'' | b'"')) => {
+            let rest = &self.text[self.at..];
+            let Some(ordinary) = rest.iter().position(|b| STOPS[usize::from(*b)]) else { return };
+            self.at += ordinary;
+            match rest[ordinary] {
+                b';' => return,
+                quote @ (b'\'' | b'"') => {
                     // Checked when the index was made.
                     if self.skip_quoted(quote).is_err() {
                         return;
                     }
                 }
-                Some(b'#') => match self.try_reference() {
+                b'#' => match self.try_reference() {
                     Some(id) => visit(id),
                     None => self.at += 1,
                 },
-                Some(_) => self.at += 1,
+                b'/' if rest[ordinary..].starts_with(b"/*") => self.space(),
+                _ => self.at += 1,
             }
         }
     }

@@ -154,8 +154,8 @@ fn parts_stand_where_the_assembly_puts_them_in_one_unit() {
     assert_close(total(&model) * 25.4 * 25.4 / 5_493.752_1, 1.0, 1e-6);
     let bounds = bounds(&model);
     let (min, max) = (25.4 * bounds.min, 25.4 * bounds.max);
-    assert_close(min.distance(DVec3::new(-41.811_78, -5.0, -16.665_921)), 0.0, 0.05);
-    assert_close(max.distance(DVec3::new(133.379_518, 26.175_789, 22.0)), 0.0, 0.05);
+    assert_close(min.distance(DVec3::new(-41.811_78, -5.0, -16.665_921)), 0.0, 1e-5);
+    assert_close(max.distance(DVec3::new(133.379_518, 26.175_789, 22.0)), 0.0, 1e-5);
 }
 
 #[test]

@@ -8,17 +8,17 @@
 use numerics::Matrix;
 
 /// Reach of the net that one step of subdivision starts from.
-pub(super) const COARSE: usize = 2;
+pub(crate) const COARSE: usize = 2;
 /// Reach of what it gives.
-pub(super) const FINE: usize = 3;
+pub(crate) const FINE: usize = 3;
 
 /// Number of control points of a net.
-pub(super) const fn count(valence: usize, reach: usize) -> usize {
+pub(crate) const fn count(valence: usize, reach: usize) -> usize {
     1 + valence * reach * (reach + 1)
 }
 
 /// Place of a control point; negative steps lead into the neighbouring sectors.
-pub(super) fn place(valence: usize, sector: usize, [a, b]: [isize; 2], reach: usize) -> usize {
+pub(crate) fn place(valence: usize, sector: usize, [a, b]: [isize; 2], reach: usize) -> usize {
     let (before, after) = ((sector + valence - 1) % valence, (sector + 1) % valence);
     match (a, b) {
         (0, 0) => 0,
@@ -32,7 +32,7 @@ pub(super) fn place(valence: usize, sector: usize, [a, b]: [isize; 2], reach: us
 
 /// Rows of a net of reach [`FINE`] after one Catmull-Clark step, from the points of one of reach
 /// [`COARSE`] (Catmull and Clark 1978).
-pub(super) fn refinement(valence: usize) -> Matrix {
+pub(crate) fn refinement(valence: usize) -> Matrix {
     let n = count(valence, COARSE);
     let mut rows = Matrix::zeros(count(valence, FINE), n);
     let add = |row: &mut [f64], sector: usize, at: [isize; 2], weight: f64| {
@@ -89,7 +89,7 @@ pub(super) fn refinement(valence: usize) -> Matrix {
 }
 
 /// Places of the points of reach [`COARSE`] in a net of reach [`FINE`].
-pub(super) fn inner(valence: usize) -> Vec<usize> {
+pub(crate) fn inner(valence: usize) -> Vec<usize> {
     let mut places = vec![0; count(valence, COARSE)];
     for sector in 0..valence {
         for a in 1..=COARSE as isize {
@@ -103,7 +103,7 @@ pub(super) fn inner(valence: usize) -> Vec<usize> {
 }
 
 /// The same net, sectors counted from another.
-pub(super) fn turned<T: Copy>(net: &[T], valence: usize, sector: usize) -> Vec<T> {
+pub(crate) fn turned<T: Copy>(net: &[T], valence: usize, sector: usize) -> Vec<T> {
     let per_sector = (net.len() - 1) / valence;
     let mut out = net.to_vec();
     out[1..].rotate_left(sector * per_sector);
@@ -111,7 +111,7 @@ pub(super) fn turned<T: Copy>(net: &[T], valence: usize, sector: usize) -> Vec<T
 }
 
 /// Weights of the uniform cubic B-splines over a span, and their derivatives.
-pub(super) fn cubic(t: f64) -> [[f64; 4]; 2] {
+pub(crate) fn cubic(t: f64) -> [[f64; 4]; 2] {
     let s = 1.0 - t;
     [
         [
@@ -125,7 +125,7 @@ pub(super) fn cubic(t: f64) -> [[f64; 4]; 2] {
 }
 
 /// The cell of a net of reach [`FINE`] that parameters in `[0, 2]²` outside of `[0, 1)²` lie in.
-pub(super) fn cell([x, y]: [f64; 2]) -> [isize; 2] {
+pub(crate) fn cell([x, y]: [f64; 2]) -> [isize; 2] {
     [x, y].map(|t| isize::from(t >= 1.0))
 }
 
@@ -142,7 +142,7 @@ mod tests {
             for i in 0..rows.rows() {
                 assert_close(rows.row(i).iter().sum::<f64>(), 1.0, 1e-14);
             }
-            let chart = super::super::chart::Chart::new(valence, &rows);
+            let chart = crate::chart::Chart::new(valence, &rows);
             assert_close(chart.ratio, subdominant_eigenvalue(valence), 1e-12);
         }
     }

@@ -1,7 +1,7 @@
 //! The characteristic map: the plane picture that the surface around an extraordinary vertex
 //! tends to, and into which it shrinks by one ratio with every step.
 
-use super::net::{COARSE, FINE, cell, count, cubic, inner, place};
+use crate::chart_net::{COARSE, FINE, cell, count, cubic, inner, place};
 use numerics::Matrix;
 use std::f64::consts::TAU;
 
@@ -16,17 +16,17 @@ const SAME: f64 = 1e-12;
 const LEAST: f64 = 1e-4;
 
 /// The characteristic map of a valence (Reif 1995): sector 0 begins at the first axis.
-pub(super) struct Chart {
+pub(crate) struct Chart {
     /// By how much a step shrinks it: the subdominant eigenvalue.
-    pub(super) ratio: f64,
+    pub(crate) ratio: f64,
     valence: usize,
     /// The eigenvector, on a net of reach [`FINE`].
-    pub(super) fine: Vec<[f64; 2]>,
+    pub(crate) fine: Vec<[f64; 2]>,
 }
 
 impl Chart {
-    /// Of the rows of [`super::net::refinement`].
-    pub(super) fn new(valence: usize, rows: &Matrix) -> Self {
+    /// Of the rows of [`refinement`](crate::chart_net::refinement).
+    pub(crate) fn new(valence: usize, rows: &Matrix) -> Self {
         let direction = |k: usize| {
             let angle = TAU * k as f64 / valence as f64;
             [angle.cos(), angle.sin()]
@@ -61,7 +61,7 @@ impl Chart {
     }
 
     /// The place of parameters of sector 0 in `[0, 1]²`, and its derivatives by both.
-    pub(super) fn point(&self, [u, v]: [f64; 2]) -> ([f64; 2], [[f64; 2]; 2]) {
+    pub(crate) fn point(&self, [u, v]: [f64; 2]) -> ([f64; 2], [[f64; 2]; 2]) {
         let ([x, y], halvings) = magnified([u, v]);
         let [a, b] = cell([x, y]);
         let (at_u, at_v) = (cubic(x - a as f64), cubic(y - b as f64));
@@ -83,7 +83,7 @@ impl Chart {
     }
 
     /// Parameters of sector 0 whose place is `target`, searched from a guess.
-    pub(super) fn inverse(&self, target: [f64; 2], guess: [f64; 2]) -> [f64; 2] {
+    pub(crate) fn inverse(&self, target: [f64; 2], guess: [f64; 2]) -> [f64; 2] {
         let off = |at: [f64; 2]| {
             let (p, d) = self.point(at);
             ([p[0] - target[0], p[1] - target[1]], d)
@@ -116,7 +116,7 @@ impl Chart {
 }
 
 /// Parameters scaled by powers of two until the larger is in `(1, 2]`, and by how many.
-pub(super) fn magnified([mut u, mut v]: [f64; 2]) -> ([f64; 2], i32) {
+pub(crate) fn magnified([mut u, mut v]: [f64; 2]) -> ([f64; 2], i32) {
     let mut halvings = 0;
     if u.max(v) < LEAST {
         (u, v) = (LEAST, LEAST);
@@ -136,8 +136,8 @@ fn step(rows: &Matrix, net: &[[f64; 2]]) -> Vec<[f64; 2]> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::net::refinement;
     use super::*;
+    use crate::chart_net::refinement;
     use geom_core::assert_close;
 
     #[test]
