@@ -3,8 +3,10 @@
 usage: open_cascade.py FILE [SAMPLES]
 
 Prints {"roots": n, "valid": bool, "solids": n, "shells": n, "edges": n, "open_edges": n,
-"kink": .., "volume": .., "box": [x0, y0, z0, x1, y1, z1], "faces": [{"area": .., "domain":
-[u0, u1, v0, v1], "samples": [[u, v, x, y, z, K, H], ..]}]}; the grid includes both ends of both
+"kink": .., "volume": .., "box": [x0, y0, z0, x1, y1, z1], "faces": [{"area": .., "slack": ..,
+"domain": [u0, u1, v0, v1], "samples": [[u, v, x, y, z, K, H], ..]}]}; the slack of an area is what
+the tolerances of the edges, by which their courses in space and on the face differ, make of it along
+their lengths; the grid includes both ends of both
 parameters. Edges without length are not counted; open ones have one face. The kink is the largest
 angle in degrees between the normals of two faces at places along the edge they share.
 Lengths are millimetres, as Open CASCADE converts them.
@@ -126,6 +128,19 @@ def area_of(face):
     return properties.Mass()
 
 
+def slack_of(face):
+    slack = 0.0
+    explorer = TopExp_Explorer(face, TopAbs_EDGE)
+    while explorer.More():
+        edge = TopoDS.Edge_s(explorer.Current())
+        if not BRep_Tool.Degenerated_s(edge):
+            properties = GProp_GProps()
+            BRepGProp.LinearProperties_s(edge, properties)
+            slack += properties.Mass() * BRep_Tool.Tolerance_s(edge)
+        explorer.Next()
+    return slack
+
+
 def main():
     samples = int(sys.argv[2]) if len(sys.argv) > 2 else 9
     reader = STEPControl_Reader()
@@ -138,7 +153,9 @@ def main():
     while explorer.More():
         face = TopoDS.Face_s(explorer.Current())
         domain, found = samples_of(BRep_Tool.Surface_s(face), samples)
-        faces.append({"area": area_of(face), "domain": domain, "samples": found})
+        faces.append(
+            {"area": area_of(face), "slack": slack_of(face), "domain": domain, "samples": found}
+        )
         explorer.Next()
     valid = BRepCheck_Analyzer(shape).IsValid()
     edges, open_edges, kink = edges_by_faces(shape)

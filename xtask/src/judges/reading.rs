@@ -6,16 +6,18 @@ use crate::shell::{Outcome, root};
 use geom_core::BoundingBox;
 use std::path::{Path, PathBuf};
 
-/// Largest relative difference of the areas of a face that counts as agreement.
+/// Largest relative difference of the areas of a face that counts as agreement, beyond what the
+/// tolerances of its edges make of it.
 const AREA_AGREEMENT: f64 = 1e-6;
 /// The same of volumes.
 const VOLUME_AGREEMENT: f64 = 1e-6;
 /// Largest difference of bounding boxes, as a share of their diagonal.
 const BOX_AGREEMENT: f64 = 1e-6;
 /// Files with the number of faces whose area Open CASCADE misses by more, as closed forms show: a
-/// sphere without two segments and an extrusion (tests of the crate `exchange`), and a sphere with a
-/// circular hole.
-const MISSED: &[(&str, usize)] = &[("sweeps-bare.step", 2), ("abc-0000.step", 1)];
+/// sphere without two segments and an extrusion (tests of the crate `exchange`), a sphere with a
+/// circular hole, and a rational bilinear face (4.386113862 m² by quadrature with 60 x 60 nodes).
+const MISSED: &[(&str, usize)] =
+    &[("sweeps-bare.step", 2), ("abc-0000.step", 1), ("rational-bilinear.step", 1)];
 /// Files whose box Open CASCADE finds too small: a glass turned about an axis is as wide in y as in
 /// x, where both agree.
 const NARROW: &[&str] = &["abc-0000.step"];
@@ -67,9 +69,9 @@ fn judge_file(python: &Path, file: &Path, name: &str, again: &Path) -> Outcome<S
     }
     let measured: Vec<_> = model.surfaces.iter().map(|s| s.curvature_statistics()).collect();
     let mut ours: Vec<f64> = measured.iter().map(|s| s.area * scale * scale).collect();
-    let mut areas: Vec<f64> = theirs.faces.iter().map(|f| f.area).collect();
+    let mut areas: Vec<[f64; 2]> = theirs.faces.iter().map(|f| [f.area, f.slack]).collect();
     ours.sort_by(f64::total_cmp);
-    areas.sort_by(f64::total_cmp);
+    areas.sort_by(|a, b| a[0].total_cmp(&b[0]));
     let allowed = MISSED.iter().find(|(known, _)| *known == name).map_or(0, |(_, n)| *n);
     let missed = unmatched(&ours, &areas);
     if missed > allowed {
@@ -100,7 +102,7 @@ fn judge_file(python: &Path, file: &Path, name: &str, again: &Path) -> Outcome<S
             "solids, faces and open edges {wanted:?} become {found:?} ({valid}) when written"
         ));
     }
-    if theirs.solids > 0 && missed == 0 {
+    if theirs.solids > 0 && allowed == 0 {
         let change = (written.volume / theirs.volume - 1.0).abs();
         if !(change <= VOLUME_AGREEMENT) {
             return Err(format!("a volume of {} becomes {}", theirs.volume, written.volume));
@@ -109,14 +111,15 @@ fn judge_file(python: &Path, file: &Path, name: &str, again: &Path) -> Outcome<S
     Ok(format!("{} faces, {} edges, {} solids", areas.len(), theirs.edges, theirs.solids))
 }
 
-/// How many of two rising lists have no partner.
-fn unmatched(ours: &[f64], theirs: &[f64]) -> usize {
+/// How many of a rising list have no partner in one of areas with their slack.
+fn unmatched(ours: &[f64], theirs: &[[f64; 2]]) -> usize {
     let (mut k, mut missed) = (0, 0);
     for a in ours {
-        while k < theirs.len() && theirs[k] < a * (1.0 - AREA_AGREEMENT) {
+        let bound = |k: usize| AREA_AGREEMENT * a + theirs[k][1];
+        while k < theirs.len() && theirs[k][0] < a - bound(k) {
             k += 1;
         }
-        if k < theirs.len() && theirs[k] <= a * (1.0 + AREA_AGREEMENT) {
+        if k < theirs.len() && theirs[k][0] <= a + bound(k) {
             k += 1;
         } else {
             missed += 1;

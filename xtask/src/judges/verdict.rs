@@ -33,6 +33,8 @@ pub(super) struct Verdict {
 pub(super) struct Face {
     /// Square millimetres.
     pub(super) area: f64,
+    /// What the tolerances of its edges make of the area.
+    pub(super) slack: f64,
     pub(super) domain: [f64; 4],
     /// u, v, x, y, z, K, H; millimetres.
     pub(super) samples: Vec<[f64; 7]>,

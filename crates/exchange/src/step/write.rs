@@ -10,6 +10,8 @@ use geom_core::DVec3;
 use std::collections::HashMap;
 use std::fmt::Write;
 
+/// Opposite sides of a flat surface differ by no more than this share of their length.
+const PARALLEL: f64 = 1e-12;
 /// Uncertainty of positions that the file states, as a share of the bounding box.
 const UNCERTAINTY: f64 = 1e-7;
 
@@ -384,11 +386,41 @@ fn courses(sewn: &Sewn) -> HashMap<usize, Vec<(usize, BsplineCurve)>> {
         for made in face.loops.iter().flatten() {
             if let Some(course) = &made.parameters {
                 let course = if made.forward { course.clone() } else { course.reversed() };
-                courses.entry(made.edge).or_default().push((k, course));
+                let edge = &sewn.edges[made.edge];
+                let runs_alike = course.knots() == edge.curve.knots()
+                    && course.weights() == edge.curve.weights();
+                // Readers that find an edge and its course at other places of their parameters refit
+                // the course; on a plane it can be had exactly.
+                let exact = if runs_alike || edge.is_straight {
+                    None
+                } else {
+                    on_plane(&face.surface, &edge.curve)
+                };
+                courses.entry(made.edge).or_default().push((k, exact.unwrap_or(course)));
             }
         }
     }
     courses
+}
+
+/// The course of a curve in the parameters of a flat surface: an affine map of its control points.
+fn on_plane(surface: &BsplineSurface, curve: &BsplineCurve) -> Option<BsplineCurve> {
+    let [p00, p01, p10, p11] = *surface.control_points() else { return None };
+    let (a, b) = (p10 - p00, p01 - p00);
+    let is_flat = !surface.is_rational()
+        && (p11 - p00 - a - b).length() <= PARALLEL * (a.length() + b.length());
+    if !is_flat || !curve.knots().is_clamped() {
+        return None;
+    }
+    let ((u0, u1), (v0, v1)) = (surface.knots_u().domain(), surface.knots_v().domain());
+    let (e, f, g) = (a.dot(a), a.dot(b), b.dot(b));
+    let determinant = e * g - f * f;
+    let place = |p: DVec3| {
+        let (x, y) = ((p - p00).dot(a), (p - p00).dot(b));
+        let (s, t) = ((g * x - f * y) / determinant, (e * y - f * x) / determinant);
+        DVec3::new(u0 + s * (u1 - u0), v0 + t * (v1 - v0), 0.0)
+    };
+    curve.mapped(place).ok()
 }
 
 fn knot_lists(knots: &KnotVector) -> (String, String) {
