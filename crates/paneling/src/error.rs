@@ -69,7 +69,7 @@ pub enum Error {
     #[error("the surface has {crease}, which no seam smooths; split it there and panel the pieces")]
     Creased { crease: Crease },
     /// An option without meaning, such as a bound that no paneling can be measured against.
-    #[error("`{name}` is {value}; it must be positive and finite")]
+    #[error("`{name}` is {value}; it must be positive and at most 1e60")]
     BadOption { name: &'static str, value: f64 },
     /// More than one rule for the number of molds.
     #[error(

@@ -82,7 +82,7 @@ pub(super) fn kill(lab: &mut Lab, random: &mut Random) -> Outcome {
     Ok(())
 }
 
-/// An interrupt at a random moment of a long run, or of one on a file that hurts.
+/// An interrupt at a random moment of a long run.
 pub(super) fn interrupt(lab: &mut Lab, random: &mut Random) -> Outcome {
     if cfg!(not(unix)) {
         return Ok(());
